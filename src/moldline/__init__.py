@@ -1,0 +1,72 @@
+"""Geometry engine for aerodynamic shape design.
+
+A name is imported when it is first used, so that `import moldline` itself costs nothing.
+"""
+
+import importlib
+import os
+import sys
+from typing import TYPE_CHECKING, Any
+
+if "jax" in sys.modules:
+    sys.modules["jax"].config.update("jax_enable_x64", True)
+else:
+    os.environ["JAX_ENABLE_X64"] = "1"  # JAX reads it when it is imported
+
+if TYPE_CHECKING:
+    from . import errors, plot
+    from .case import load
+    from .deformers.base import AbstractBinding, AbstractDeformer, LinearBinding
+    from .deformers.foreign import AbstractNumpyDeformer
+    from .deformers.lattice import Lattice
+    from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
+    from .mesh.io import read, write
+    from .parameters import links
+    from .parameters.link import Link
+    from .parameters.variable import Variable, variable
+    from .pipeline.pipeline import Pipeline
+    from .pipeline.stage import Stage
+
+_HOMES = {
+    "AbstractBinding": "deformers.base",
+    "AbstractDeformer": "deformers.base",
+    "AbstractNumpyDeformer": "deformers.foreign",
+    "Cloud": "mesh",
+    "Geometry": "mesh",
+    "Grid": "mesh",
+    "Lattice": "deformers.lattice",
+    "LinearBinding": "deformers.base",
+    "Link": "parameters.link",
+    "Pipeline": "pipeline.pipeline",
+    "Section": "mesh",
+    "Stage": "pipeline.stage",
+    "Surface": "mesh",
+    "Variable": "parameters.variable",
+    "VolumeMesh": "mesh",
+    "errors": "",
+    "links": "parameters",
+    "load": "case",
+    "plot": "",
+    "read": "mesh.io",
+    "variable": "parameters.variable",
+    "write": "mesh.io",
+}
+
+_MODULES = {"errors", "links", "plot"}
+
+__all__ = [  # noqa: PLE0604 - the names are strings
+    *_HOMES
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'moldline' has no attribute {name!r}")
+    home = ".".join(filter(None, ["moldline", _HOMES[name]]))
+    if name in _MODULES:
+        return importlib.import_module(f"{home}.{name}")
+    return getattr(importlib.import_module(home), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,183 @@
+"""A case: what a case file describes, ready to run."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from .. import registry
+from ..deformers.base import AbstractDeformer
+from ..errors import CaseError, MoldlineError, ParameterError
+from ..mesh import Geometry
+from ..mesh.io import read
+from ..mesh.io.files import replacing
+from ..parameters.link import Link
+from ..parameters.links import LINKS, mirrored
+from ..parameters.variable import Variable, variable
+from ..pipeline.pipeline import Pipeline
+from ..pipeline.stage import Stage
+from . import options, schema
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pipeline, the values it starts from, and where its results go.
+
+    Attributes
+    ----------
+    path
+        The case file.
+    tables
+        What it says, validated.
+    pipeline
+        What it describes.
+    riders
+        Pipelines of the points that ride on a geometry, by name.
+    """
+
+    path: Path
+    tables: schema.CaseTable
+    pipeline: Pipeline
+    riders: dict[str, Pipeline]
+
+    @property
+    def units(self) -> str | None:
+        """The unit of the resulting geometry's file."""
+        return self.tables.geometry[self.pipeline.result].units
+
+    def values(self, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """The case's values with some replaced; a value outside its bounds is refused."""
+        values = self.pipeline.values(changes)
+        known = self.pipeline.variables
+        beyond = [line for name, value in values.items() for line in known[name].outside(value)]
+        if beyond:
+            raise ParameterError(f"{self.path}: " + "; ".join(beyond))
+        return values
+
+    def rider(self, name: str) -> Pipeline:
+        """The pipeline of one rider."""
+        if name not in self.riders:
+            known = ", ".join(self.riders) or "none"
+            raise ParameterError(f"{self.path}: no rider named {name!r}; it has: {known}")
+        return self.riders[name]
+
+    def output(self, kind: str) -> Path | None:
+        """Where the file puts a kind of result."""
+        place = getattr(self.tables.output, kind)
+        return None if place is None else self.path.parent / place
+
+    def save(self, path: str | os.PathLike[str], values: Mapping[str, Any] | None = None) -> None:
+        """Write the case file, with new values where given; it then reads back as this case."""
+        tables = self.tables.model_dump(exclude_unset=True, mode="json")
+        for name, value in (values or {}).items():
+            checked = self.pipeline.variables[name].checked(np.asarray(value, float))
+            tables["variable"][name]["value"] = np.asarray(checked).tolist()
+        target = Path(path)
+        if target.parent.resolve() != self.path.parent.resolve():
+            for table in (*tables["geometry"].values(), *tables.get("rider", {}).values()):
+                table["file"] = str((self.path.parent / table["file"]).resolve())
+        with replacing(target) as stream:
+            stream.write(tomli_w.dumps(_without_none(tables)).encode())
+
+
+def load(path: str | os.PathLike[str]) -> Case:
+    """Read a case file and the geometries it names."""
+    place = Path(path)
+    file = str(place)
+    tables = schema.parse(schema.text_of(place), file)
+    geometries = {
+        name: _read(place, table, f"geometry.{name}") for name, table in tables.geometry.items()
+    }
+    variables = {name: _variable(file, name, table) for name, table in tables.variable.items()}
+    stages = [
+        _stage(file, f"stage.{i}", table, geometries, variables)
+        for i, table in enumerate(tables.stage)
+    ]
+    unused = variables.keys() - {v.name for stage in stages for v in stage.links}
+    if unused:
+        raise CaseError(
+            f"{file}: variable.{sorted(unused)[0]}: no stage has a link to it, so it moves nothing"
+        )
+    try:
+        pipeline = Pipeline(geometries, stages)
+        riders = {
+            name: pipeline.embed(_read(place, table, f"rider.{name}"), table.on, name)
+            for name, table in tables.rider.items()
+        }
+    except ParameterError as error:
+        raise CaseError(f"{file}: {error}") from None
+    return Case(place, tables, pipeline, riders)
+
+
+def _read(case: Path, table: schema.GeometryTable, where: str) -> Geometry:
+    try:
+        return read(case.parent / table.file, units=table.units)
+    except MoldlineError as error:
+        raise CaseError(f"{case}: {where}.file: {error}") from None
+
+
+def _variable(file: str, name: str, table: schema.VariableTable) -> Variable:
+    given = {k: v for k, v in table.model_dump(exclude_unset=True).items() if v is not None}
+    try:
+        return variable(name, **given)
+    except ParameterError as error:
+        raise CaseError(f"{file}: variable.{name}: {error}") from None
+
+
+def _stage(
+    file: str,
+    where: str,
+    table: schema.StageTable,
+    geometries: dict[str, Geometry],
+    variables: dict[str, Variable],
+) -> Stage:
+    on = table.on or (next(iter(geometries)) if len(geometries) == 1 else "")
+    if on not in geometries:
+        raise CaseError(
+            f"{file}: {where}.on: got {table.on!r}, expected one of {', '.join(geometries)}"
+        )
+    try:
+        cls = registry.deformer(table.deformer)
+        model = options.of_deformer(table.deformer, cls)
+        deformer = cls.build(
+            geometries[on], **schema.checked(model, table.model_extra or {}, file, where)
+        )
+        links: dict[Variable, Link] = {}
+        for i, row in enumerate(table.link):
+            place = f"{where}.link.{i}"
+            if row.variable not in variables:
+                raise CaseError(
+                    f"{file}: {place}.variable: got {row.variable!r}, expected one of "
+                    f"{', '.join(variables)}"
+                )
+            known = variables[row.variable]
+            link = _link(file, place, row, deformer)
+            links[known] = links[known] + link if known in links else link
+        return Stage(deformer, links, on, table.name)
+    except (ParameterError, MoldlineError) as error:
+        if isinstance(error, CaseError):
+            raise
+        raise CaseError(f"{file}: {where}: {error}") from None
+
+
+def _link(file: str, where: str, table: schema.LinkTable, deformer: AbstractDeformer) -> Link:
+    function = LINKS[table.link]
+    model = options.of_link(table.link, function)
+    given = schema.checked(model, table.model_extra or {}, file, where)
+    if table.link != "controls" and not hasattr(deformer, "rest"):
+        raise CaseError(
+            f"{file}: {where}.link: {table.link!r} needs a lattice; use link = \"controls\""
+        )
+    link = function(deformer, **given) * table.scale  # type: ignore[operator]
+    return mirrored(deformer, link, table.mirrored) if table.mirrored else link  # type: ignore
+
+
+def _without_none(table: Any) -> Any:
+    """TOML has no null: such keys are left out."""
+    if isinstance(table, dict):
+        return {k: _without_none(v) for k, v in table.items() if v is not None}
+    return table

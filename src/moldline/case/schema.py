@@ -1,0 +1,164 @@
+"""What a case file may hold, as models that validate it and as a JSON Schema for editors."""
+
+import tomllib
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .. import registry
+from ..errors import CaseError, ParameterError
+from ..parameters.links import LINKS
+from ..parameters.variable import UNITS
+from . import options
+
+VERSION = 1
+"""Of the case file's format; a file of another version is refused with a word on what to do."""
+
+Pair = tuple[float, float]
+Unit = Literal[tuple(UNITS)]  # type: ignore[valid-type]
+LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
+
+
+class Table(BaseModel):
+    """A table of a case file: no key that is not named here."""
+
+    model_config = ConfigDict(extra="forbid", strict=False)
+
+
+class GeometryTable(Table):
+    """A geometry, read from a file."""
+
+    file: str = Field(description="path, relative to the case file")
+    units: LengthUnit | None = Field(None, description="the file's unit; then metres inside")
+
+
+class RiderTable(GeometryTable):
+    """Other points that move as a geometry does: a flow mesh, a structural model."""
+
+    on: str = Field("", description="the geometry that they ride on")
+
+
+class VariableTable(Table):
+    """A design variable."""
+
+    size: int | None = Field(None, ge=1, description="how many numbers; else as many as `value`")
+    value: float | list[float] = Field(0.0, description="one number for all, or one each")
+    bounds: Pair | list[Pair] | None = Field(None, description="lower and upper, in `unit`")
+    typical: float | None = Field(None, gt=0, description="a change that matters, in `unit`")
+    unit: Unit = Field("", description="the designer's unit; SI and radians inside")
+
+
+class LinkTable(BaseModel):
+    """How a variable turns the stage's controls; further keys are the link's own."""
+
+    model_config = ConfigDict(extra="allow")
+    variable: str
+    link: Literal[tuple(LINKS)]  # type: ignore[valid-type]
+    scale: float = 1.0
+    mirrored: Literal["x", "y", "z"] | None = Field(
+        None, description="copy the half on the positive side of this coordinate's plane"
+    )
+
+
+class StageTable(BaseModel):
+    """One deformer; further keys are its own options."""
+
+    model_config = ConfigDict(extra="allow")
+    deformer: str
+    name: str = ""
+    on: str = Field("", description="the geometry it acts on; not needed where there is one")
+    link: list[LinkTable] = Field(default_factory=list)
+
+
+class OutputTable(Table):
+    """Where results go, relative to the case file, when the command line names no place."""
+
+    surface: str | None = Field(None, description="the deformed geometry")
+    sensitivity: str | None = Field(None, description="the deformed geometry with derivatives")
+
+
+class CaseTable(Table):
+    """A whole case file."""
+
+    moldline: Literal[1] = Field(description="version of this format")
+    geometry: dict[str, GeometryTable] = Field(min_length=1)
+    variable: dict[str, VariableTable] = Field(default_factory=dict)
+    stage: list[StageTable] = Field(default_factory=list)
+    rider: dict[str, RiderTable] = Field(default_factory=dict)
+    output: OutputTable = Field(default_factory=OutputTable)
+
+
+def parse(text: str, file: str) -> CaseTable:
+    """Validate a case file's text; `file` is what errors call it."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"{file}: not TOML: {error}") from None
+    if tables.get("moldline", VERSION) != VERSION:
+        raise CaseError(
+            f"{file}: moldline: format version {tables['moldline']!r} found, expected {VERSION}; "
+            f"it was written for another moldline"
+        )
+    try:
+        return CaseTable.model_validate(tables)
+    except ValidationError as error:
+        raise CaseError(_listed(file, options.problems(error, ""))) from None
+
+
+def checked(model: type[BaseModel], given: dict[str, Any], file: str, where: str) -> dict[str, Any]:
+    """Options that a model accepts, as keyword arguments; only those that were given."""
+    try:
+        instance = model.model_validate(given)
+    except ValidationError as error:
+        raise CaseError(_listed(file, options.problems(error, where))) from None
+    return {name: getattr(instance, name) for name in instance.model_fields_set}
+
+
+def _listed(file: str, found: list[str]) -> str:
+    return "\n".join(f"{file}: {line}" for line in found)
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of the case file, with the options of every installed deformer and link."""
+    schema = CaseTable.model_json_schema()
+    definitions = schema["$defs"]
+    definitions["StageTable"] = _choice(
+        definitions["StageTable"],
+        "deformer",
+        {name: options.of_deformer(name, registry.deformer(name)) for name in registry.deformers()},
+    )
+    definitions["LinkTable"] = _choice(
+        definitions["LinkTable"],
+        "link",
+        {name: options.of_link(name, function) for name, function in LINKS.items()},
+    )
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "moldline case file"} | schema
+
+
+def _choice(table: dict[str, Any], key: str, models: dict[str, type[BaseModel]]) -> dict[str, Any]:
+    """A table whose further keys depend on one of its own."""
+    branches = []
+    for name, model in models.items():
+        own = model.model_json_schema()
+        branches.append(
+            {
+                "properties": table["properties"] | own.get("properties", {}) | {key: {"const": name}},
+                "required": sorted({*table["required"], *own.get("required", [])}),
+                "additionalProperties": False,
+            }
+        )
+    return {"type": "object", "description": table.get("description", ""), "oneOf": branches}
+
+
+def text_of(path: Path) -> str:
+    """A case file's text."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path}: not a text file: byte {error.start} is not UTF-8") from None
+
+
+__all__ = ["CaseTable", "ParameterError", "checked", "json_schema", "parse", "text_of"]

@@ -1,0 +1,60 @@
+"""`moldline deform`."""
+
+import argparse
+from pathlib import Path
+
+from . import show, values
+
+HELP = "Deform a case's geometry by its variables' values and write it."
+EXAMPLE = """\
+  moldline deform examples/transport_wing.toml --set thickness[3]=0.1 -o wing_new.tri"""
+
+
+def configure(command: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    values.configure(command)
+    command.add_argument(
+        "-o", "--output", type=Path, help="file to write; its name tells the format"
+    )
+    command.add_argument("--rider", help="deform this rider of the case instead of its geometry")
+    command.add_argument("--json", action="store_true", help="report for a script")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Do it."""
+    import time
+
+    import numpy as np
+
+    from ..case import load
+    from ..errors import ParameterError
+    from ..mesh.io import write
+    from ..pipeline import examine
+
+    case = load(given.case)
+    chosen = values.chosen(case, given)
+    pipeline = case.rider(given.rider) if given.rider else case.pipeline
+    target = given.output or case.output("surface")
+    if target is None:
+        raise ParameterError("where to? give -o FILE, or output.surface in the case file")
+    pipeline(chosen)
+    start = time.perf_counter()
+    shape = pipeline(chosen)
+    seconds = time.perf_counter() - start
+    write(target, shape, units=case.units)
+    rest = np.asarray(pipeline.geometry.points)
+    moved = float(np.linalg.norm(np.asarray(shape.points) - rest, axis=1).max())
+    torn = examine.tears(pipeline, chosen)
+    report = {
+        "points": len(rest),
+        "largest_motion": moved,
+        "seconds": seconds,
+        "file": str(target),
+        "tears": [vars(tear) for tear in torn],
+    }
+    lines = [
+        f"{target}: {len(rest)} points, moved by up to {moved:.6g}, in {1e3 * seconds:.2f} ms",
+        *map(str, torn),
+    ]
+    show(report, given.json, lines)
+    return 0

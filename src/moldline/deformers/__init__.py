@@ -1,0 +1,1 @@
+"""DEFORM: recipes that move points, each obeying a vector of controls."""

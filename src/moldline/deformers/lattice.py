@@ -1,0 +1,315 @@
+"""A lattice: free-form deformation by a box of control points."""
+
+from collections.abc import Sequence
+from typing import Any, Literal, Self
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse
+from jaxtyping import Float
+from typing_extensions import override
+
+from .._types import Array, Points, Vector, is_concrete
+from ..errors import GeometryError, ParameterError
+from ..numerics import bspline
+from .base import AbstractBinding, AbstractDeformer, DefinedBinding
+from .lattice_kernels import Embedding, Following
+
+Triple = tuple[int, int, int]
+Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
+Basis = Literal["b-spline", "bernstein"]
+
+AXES = {"x": 0, "y": 1, "z": 2}
+
+
+class Lattice(AbstractDeformer):
+    """Move what is inside a box by its control points.
+
+    A point moves by the sum of the control points' displacements, each with its tensor-product
+    spline weight at the point. Controls are displacements in space [m], in the order of an array
+    of shape (nu, nv, nw, 3). The lattice's own axes are called x, y and z; they run along its edges.
+
+    Attributes
+    ----------
+    origin
+        The corner of the box where all three indices are zero.
+    edges
+        Rows are the three edges of the box from there: any directions that span a box.
+    shape
+        Control points along each axis. With one, nothing depends on that axis.
+    axes
+        The spline of each axis.
+    outside
+        "keep": points outside the box stay. "extend": they move as the nearest end does.
+    ends
+        "clamped": control points at the Greville positions, so that an affine motion of the
+        controls is that motion of the geometry. "blender": Blender's even spacing and end rule.
+    frozen
+        Which control points never move, whatever the controls say, shape (nu, nv, nw).
+
+    Notes
+    -----
+    Source: Sederberg and Parry, Free-Form Deformation of Solid Geometric Models, SIGGRAPH 1986
+    (Bernstein); Piegl and Tiller, The NURBS Book (B-splines). docs/theory/lattice.md derives it.
+    """
+
+    origin: Float[np.ndarray, "3"]
+    edges: Float[np.ndarray, "3 3"]
+    axes: tuple[bspline.Axis, bspline.Axis, bspline.Axis]
+    frozen: np.ndarray
+    shape: Triple = eqx.field(static=True)
+    ends: bspline.Ends = eqx.field(static=True)
+    outside: bspline.Outside = eqx.field(static=True)
+    following: Following = eqx.field(static=True)
+
+    def __init__(
+        self,
+        origin: Any,
+        edges: Any,
+        shape: Sequence[int],
+        *,
+        ends: bspline.Ends = "clamped",
+        outside: bspline.Outside = "keep",
+        basis: Basis = "b-spline",
+        degree: int | Sequence[int] = 3,
+        knots: Sequence[Sequence[float] | None] = (None, None, None),
+        freeze: Sequence[Side] = (),
+    ):
+        _check_choice("ends", ends, bspline.Ends)
+        _check_choice("outside", outside, bspline.Outside)
+        _check_choice("basis", basis, Basis)
+        if len(shape) != 3 or any(n != int(n) or n < 1 for n in shape):
+            raise ParameterError(f"a lattice has three counts of at least 1, got {tuple(shape)}")
+        self.origin = np.asarray(origin, float)
+        self.edges = np.asarray(edges, float)
+        self.shape = (int(shape[0]), int(shape[1]), int(shape[2]))
+        self.ends, self.outside = ends, outside
+        degrees = (degree,) * 3 if isinstance(degree, int) else tuple(degree)
+        if basis == "bernstein":
+            degrees = tuple(n - 1 for n in self.shape)
+        if min(degrees) < 1 and max(self.shape) > 1 and basis == "b-spline":
+            raise ParameterError(f"the degree of a lattice is at least 1, got {degree}")
+        if ends == "blender" and (degrees != (3, 3, 3) or any(knots)):
+            raise ParameterError("ends='blender' is cubic, with even spacing; leave out the rest")
+        self.axes = tuple(  # type: ignore[assignment]
+            bspline.even(n, outside)
+            if ends == "blender"
+            else bspline.clamped(n, p, outside, None if k is None else tuple(k))
+            for n, p, k in zip(self.shape, degrees, knots, strict=True)
+        )
+        self.frozen = _frozen(self.shape, self.axes, ends, tuple(freeze))
+        self.following = Following(self)
+
+    def __check_init__(self) -> None:
+        if self.origin.shape != (3,) or self.edges.shape != (3, 3):
+            raise ParameterError(
+                f"a box needs an origin (3,) and edges (3, 3), "
+                f"got {self.origin.shape} and {self.edges.shape}"
+            )
+        volume = np.linalg.det(self.edges / np.linalg.norm(self.edges, axis=1, keepdims=True))
+        if not np.isfinite(volume) or abs(volume) < 1e-9:
+            raise ParameterError(f"the edges of a lattice must span a box, got {self.edges}")
+
+    @classmethod
+    def box(cls, low: Any, high: Any, shape: Sequence[int], **options: Any) -> Self:
+        """A lattice along the axes of space from one corner to the opposite one [m]."""
+        extent = np.asarray(high, float) - np.asarray(low, float)
+        flat = (extent <= 0) & (np.asarray(shape) > 1)
+        if np.any(flat):
+            raise GeometryError(
+                f"a lattice from {list(map(float, low))} to {list(map(float, high))} is flat "
+                f"along {'xyz'[int(np.argmax(flat))]}; give that axis one control point"
+            )
+        return cls(low, np.diag(np.where(extent > 0, extent, 1.0)), shape, **options)
+
+    @classmethod
+    def around(
+        cls,
+        geometry: Any,
+        shape: Sequence[int],
+        margin: float | Sequence[float] = 0.02,
+        component: str | None = None,
+        **options: Any,
+    ) -> Self:
+        """The box along the axes of space that encloses a geometry, or one component of it.
+
+        `margin` is what it is larger by at each side, as a fraction of the extent; three numbers
+        for three axes.
+        """
+        points = np.asarray(getattr(geometry, "points", geometry))
+        if component is not None:
+            points = points[geometry.component(component)]
+        low, high = points.min(axis=0), points.max(axis=0)
+        room = np.broadcast_to(np.asarray(margin, float), 3) * (high - low)
+        return cls.box(low - room, high + room, shape, **options)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Any,
+        *,
+        shape: tuple[int, int, int],
+        margin: float | tuple[float, float, float] = 0.02,
+        component: str | None = None,
+        low: tuple[float, float, float] | None = None,
+        high: tuple[float, float, float] | None = None,
+        origin: tuple[float, float, float] | None = None,
+        edges: tuple[tuple[float, float, float], ...] | None = None,
+        ends: bspline.Ends = "clamped",
+        outside: bspline.Outside = "keep",
+        basis: Basis = "b-spline",
+        degree: int | tuple[int, int, int] = 3,
+        knots: tuple[tuple[float, ...] | None, ...] = (None, None, None),
+        freeze: tuple[Side, ...] = (),
+    ) -> Self:
+        """From a case file: by low and high, by origin and edges, else around the geometry."""
+        rest: dict[str, Any] = {
+            "ends": ends, "outside": outside, "basis": basis,
+            "degree": degree, "knots": knots, "freeze": freeze,
+        }  # fmt: skip
+        if (low is None) != (high is None) or (origin is None) != (edges is None):
+            raise ParameterError("low goes with high, and origin with edges")
+        if origin is not None:
+            return cls(origin, edges, shape, **rest)
+        if low is not None:
+            return cls.box(low, high, shape, **rest)
+        return cls.around(geometry, shape, margin, component, **rest)
+
+    @property
+    @override
+    def size(self) -> int:
+        return 3 * self.shape[0] * self.shape[1] * self.shape[2]
+
+    @property
+    def rest(self) -> Float[np.ndarray, "nu nv nw 3"]:
+        """Control points at rest [m]."""
+        u, v, w = np.meshgrid(*(axis.rest for axis in self.axes), indexing="ij")
+        return self.origin + np.stack([u, v, w], axis=-1) @ self.edges
+
+    def moved(self, controls: Vector) -> Float[Array, "nu nv nw 3"]:
+        """Control points where the controls put them [m]."""
+        return self.rest + self.moves(controls)
+
+    def moves(self, controls: Vector) -> Float[Array, "nu nv nw 3"]:
+        """Displacements of the control points [m], zero for the frozen ones."""
+        moves = controls.reshape(*self.shape, 3)
+        return moves * ~self.frozen[..., None] if self.frozen.any() else moves
+
+    def direction(self, axis: str) -> Float[np.ndarray, "3"]:
+        """Unit vector of one of the lattice's own axes."""
+        edge = self.edges[AXES[axis]]
+        return edge / np.linalg.norm(edge)
+
+    @property
+    def inverse(self) -> Float[np.ndarray, "3 3"]:
+        """Takes a place relative to the origin to box coordinates: (x - origin) @ inverse."""
+        return np.linalg.inv(self.edges)
+
+    @override
+    def __call__(self, points: Points, controls: Vector) -> Points:
+        return points + self.field(points, self.moves(controls))
+
+    def field(self, points: Points, moves: Float[Array, "nu nv nw 3"]) -> Points:
+        """Displacements of points by displacements of the control points [m]."""
+        powers = [axis.powers for axis in self.axes]
+        table = jnp.einsum("iau,jbv,kcw,uvwd->ijkdabc", *powers, moves, optimize="optimal")
+        table = table.reshape(-1, *table.shape[3:])
+        u = (jnp.asarray(points) - self.origin) @ self.inverse
+        cells, local = zip(*(_located(axis, u[:, i]) for i, axis in enumerate(self.axes)))
+        lengths = [len(axis.starts) for axis in self.axes]
+        row = (cells[0] * lengths[1] + cells[1]) * lengths[2] + cells[2]
+        return _polynomial(table[row], *local)
+
+    @override
+    def bind(self, points: Points) -> AbstractBinding:
+        if not is_concrete(points):
+            return DefinedBinding(self, points)
+        return LatticeBinding(Embedding(self, np.asarray(points)))
+
+    @override
+    def follow(self, points: Points, controls: Vector) -> Points:
+        return self.following(points, self.moves(controls))[0]
+
+    def tears(self, points: Points, edges: Array, controls: Vector) -> tuple[Array, Array]:
+        """Where a mesh is torn by a box whose outside stays: places (t, 3) and gaps (t,) [m].
+
+        Each mesh edge (pairs of points) that leaves the box is followed to where it leaves; the
+        gap is how far the inside moves there.
+        """
+        if self.outside == "extend":
+            return np.empty((0, 3)), np.empty(0)
+        points = np.asarray(points)
+        u = (points - self.origin) @ self.inverse
+        free = np.array(self.shape) == 1
+        inside = np.all(((u >= 0) & (u <= 1)) | free, axis=1)
+        start, end = np.asarray(edges).T
+        start, end = np.where(inside[start], (start, end), (end, start))
+        crossing = inside[start] & ~inside[end]
+        start, end = start[crossing], end[crossing]
+        step = np.where(free, 0.0, u[end] - u[start])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            reach = np.where(step > 0, (1 - u[start]) / step, -u[start] / step)
+        share = np.nanmin(np.where(step == 0, np.inf, reach), axis=1, initial=1.0)
+        places = points[start] + (1 - 1e-9) * share[:, None] * (points[end] - points[start])
+        gaps = np.asarray(self(places, jnp.asarray(controls))) - places
+        return places, np.linalg.norm(gaps, axis=1)
+
+
+class LatticeBinding(AbstractBinding):
+    """A lattice on fixed points: sorted by cell once, one pass per deformation."""
+
+    embedding: Embedding = eqx.field(static=True)
+
+    @override
+    def __call__(self, controls: Vector) -> Points:
+        return self.embedding.move(self.embedding.lattice.moves(controls))[0]
+
+    def jacobian(self) -> scipy.sparse.csr_array:
+        """Derivative of all coordinates by all controls, sparse, shape (3n, 3 nu nv nw)."""
+        return scipy.sparse.csr_array(scipy.sparse.kron(self.embedding.weights(), np.eye(3)))
+
+
+def _located(axis: bspline.Axis, u: Array) -> tuple[Array, Array]:
+    cell = jnp.searchsorted(axis.starts, jax.lax.stop_gradient(u), side="right") - 1
+    return cell, (u - jnp.asarray(axis.offsets)[cell]) * jnp.asarray(axis.scales)[cell]
+
+
+def _polynomial(c: Array, x: Array, y: Array, z: Array) -> Array:
+    """Nested Horner scheme; c has the shape (n, 3, P, Q, R)."""
+    for t in (z, y, x):
+        value = c[..., -1]
+        weight = t.reshape(-1, *(1,) * (value.ndim - 1))
+        for power in range(c.shape[-1] - 2, -1, -1):
+            value = value * weight + c[..., power]
+        c = value
+    return c
+
+
+def _frozen(
+    shape: Triple, axes: tuple[bspline.Axis, ...], ends: str, sides: tuple[Side, ...]
+) -> np.ndarray:
+    """The rows next to each named side whose rest makes the motion fade smoothly to nothing."""
+    frozen = np.zeros(shape, bool)
+    for side in sides:
+        _check_choice("freeze", side, Side)
+        axis = AXES[side[0]]
+        rows = 2 if ends == "blender" else axes[axis].terms - 1
+        if rows >= shape[axis]:
+            raise ParameterError(
+                f"freezing {side} takes {rows} rows, but the lattice has only {shape[axis]} "
+                f"along {side[0]}; give it more control points there"
+            )
+        places = slice(None, rows) if side[1] == "-" else slice(-rows, None)
+        frozen[(slice(None),) * axis + (places,)] = True
+    if frozen.all():
+        raise ParameterError(f"freezing {', '.join(sides)} leaves no free control point in {shape}")
+    return frozen
+
+
+def _check_choice(name: str, value: str, choices: Any) -> None:
+    allowed = choices.__args__
+    if value not in allowed:
+        raise ParameterError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")

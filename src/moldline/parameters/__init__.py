@@ -1,0 +1,1 @@
+"""PARAMETERISE: what the designer turns, and how it turns controls."""

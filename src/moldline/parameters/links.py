@@ -1,0 +1,173 @@
+"""The usual links: single controls, groups, thickness, camber, radius, mirrored pairs.
+
+A lattice's axes are named x, y, z along its own edges. All displacements are in metres.
+"""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from .._types import Array
+from ..deformers.base import AbstractDeformer
+from ..deformers.lattice import AXES, Lattice
+from ..errors import ParameterError
+from .link import Across, Link
+
+AxisName = Literal["x", "y", "z"]
+
+
+def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -> Link:
+    """One variable number for each of a deformer's controls, or for those given by number."""
+    chosen = range(deformer.size) if numbers is None else numbers
+    _check_numbers(chosen, deformer.size, "controls")
+    matrix = np.zeros((deformer.size, len(chosen)))
+    matrix[list(chosen), range(len(chosen))] = 1.0
+    return Link(matrix)
+
+
+def each(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
+    """One number for each chosen control point: its displacement along an axis.
+
+    `where` is as for `group`; without it all control points are chosen, in the order of their array.
+    """
+    chosen = chosen_controls(lattice, **where)
+    motion = np.zeros((lattice.size // 3, 3, len(chosen)))
+    motion[chosen, :, range(len(chosen))] = lattice.direction(axis)
+    return Link(motion.reshape(lattice.size, -1))
+
+
+def group(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
+    """One number moves all chosen control points together along an axis.
+
+    Choose by one of: `index`, a list of (i, j, k); `inside`, two opposite corners of a box in
+    space; `near` and `radius`, a point in space and a distance [m].
+    """
+    return Link(each(lattice, axis, **where).matrix.sum(axis=1, keepdims=True))
+
+
+def camber(
+    lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName
+) -> Link:
+    """At each station along one axis (or two), all controls move together along another."""
+    return _stations(lattice, along, axis, np.ones(lattice.shape[AXES[axis]]))
+
+
+def thickness(
+    lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName
+) -> Link:
+    """At each station, the two sides move apart: the number is the growth of the box there.
+
+    Upper controls move by half of it, lower ones by minus half, rows between in proportion.
+    """
+    rest = lattice.axes[AXES[axis]].rest
+    if len(rest) < 2:
+        raise ParameterError(f"thickness along {axis} needs two control points there, got 1")
+    return _stations(lattice, along, axis, rest - 0.5)
+
+
+def radius(lattice: Lattice, along: AxisName) -> Link:
+    """At each station along an axis, the section grows: each side moves outwards by the number."""
+    place = np.stack(np.meshgrid(*(a.rest for a in lattice.axes), indexing="ij"), axis=-1)
+    outward = np.zeros((*lattice.shape, 3))
+    for axis in set(AXES) - {along}:
+        if lattice.shape[AXES[axis]] > 1:
+            share = 2 * place[..., AXES[axis]] - 1
+            outward += share[..., None] * lattice.direction(axis)
+    return Link(_by_station(lattice, (along,), outward))
+
+
+def mirrored(lattice: Lattice, link: Link, across: Across) -> Link:
+    """The same, with the half on the positive side of a plane of symmetry copied to the other.
+
+    `across` names the coordinate of space that is 0 on the plane; the lattice must be symmetric
+    about it, or have its border on it. Controls on the plane move only within it, and points on
+    it stay there to the bit.
+    """
+    axis = AXES[across]
+    places = lattice.rest.reshape(-1, 3)
+    scale = np.abs(lattice.edges).sum()
+    flip = np.where(np.arange(3) == axis, -1.0, 1.0)
+    gaps = np.abs(places[:, None] * flip - places).sum(axis=2)
+    partner = gaps.argmin(axis=1)
+    one_sided = places[:, axis].min() >= -1e-9 * scale
+    if not one_sided and gaps.min(axis=1).max() > 1e-9 * scale:
+        raise ParameterError(
+            f"a lattice from {across} = {places[:, axis].min():g} to {places[:, axis].max():g} is "
+            f"not symmetric about {across} = 0; make it so, or begin it there"
+        )
+    motion = np.array(link.matrix).reshape(-1, 3, link.size)
+    lower = places[:, axis] < -1e-9 * scale
+    motion[lower] = motion[partner[lower]] * flip[:, None]
+    motion[np.abs(places[:, axis]) <= 1e-9 * scale, axis] = 0.0
+    return Link(motion.reshape(lattice.size, -1), across)
+
+
+def _stations(lattice: Lattice, along: Any, axis: AxisName, share: np.ndarray) -> Link:
+    """Controls move along an axis by their row's share of the number at their station."""
+    along = (along,) if isinstance(along, str) else tuple(along)
+    if axis in along:
+        raise ParameterError(f"stations along {', '.join(along)} cannot move along {axis} too")
+    shape = [1, 1, 1]
+    shape[AXES[axis]] = -1
+    motion = share.reshape(shape)[..., None] * lattice.direction(axis)
+    return Link(_by_station(lattice, along, np.broadcast_to(motion, (*lattice.shape, 3))))
+
+
+def _by_station(lattice: Lattice, along: tuple[str, ...], motion: Array) -> np.ndarray:
+    """One column per station: the motion of its controls; the first axis of `along` runs slowest."""
+    order = [AXES[name] for name in along]
+    counts = [lattice.shape[i] for i in order]
+    index = np.indices(lattice.shape)
+    station = np.ravel_multi_index(tuple(index[i] for i in order), counts)
+    columns = np.zeros((*lattice.shape, 3, int(np.prod(counts))))
+    np.put_along_axis(columns, station[..., None, None], motion[..., None], axis=-1)
+    return columns.reshape(lattice.size, -1)
+
+
+def chosen_controls(
+    lattice: Lattice,
+    index: Sequence[Sequence[int]] | None = None,
+    inside: Sequence[Sequence[float]] | None = None,
+    near: Sequence[float] | None = None,
+    radius: float | None = None,
+) -> np.ndarray:
+    """Numbers of the chosen control points."""
+    places = lattice.rest.reshape(-1, 3)
+    if (near is None) != (radius is None) or sum(x is not None for x in (index, inside, near)) > 1:
+        raise ParameterError("choose control points by index, by inside, or by near with radius")
+    if index is not None:
+        rows = np.asarray(index, int).reshape(-1, 3)
+        if np.any((rows < 0) | (rows >= lattice.shape)):
+            raise ParameterError(f"index {rows.tolist()} leaves a lattice of {lattice.shape}")
+        return np.ravel_multi_index(tuple(rows.T), lattice.shape)
+    if inside is not None:
+        low, high = np.sort(np.asarray(inside, float), axis=0)
+        chosen = np.flatnonzero(np.all((places >= low) & (places <= high), axis=1))
+    elif near is not None:
+        chosen = np.flatnonzero(np.linalg.norm(places - np.asarray(near), axis=1) <= radius)
+    else:
+        return np.arange(len(places))
+    if len(chosen) == 0:
+        raise ParameterError(
+            f"no control point there; the lattice reaches from {places.min(axis=0).tolist()} "
+            f"to {places.max(axis=0).tolist()}"
+        )
+    return chosen
+
+
+def _check_numbers(numbers: Sequence[int], count: int, what: str) -> None:
+    bad = [n for n in numbers if not 0 <= n < count]
+    if bad:
+        raise ParameterError(f"{what} run from 0 to {count - 1}, got {bad[0]}")
+
+
+LINKS = {
+    "controls": controls,
+    "each": each,
+    "group": group,
+    "camber": camber,
+    "thickness": thickness,
+    "radius": radius,
+}
+"""Links by the name that a case file calls them."""

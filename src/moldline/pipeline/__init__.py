@@ -1,0 +1,1 @@
+"""DERIVE: stages in order, from variable values to a shape and its exact derivatives."""

@@ -1,0 +1,184 @@
+"""Is this deformation sound: does space fold over, does the mesh tear, are derivatives right?"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+
+from ..deformers.base import map_slopes
+from ..deformers.foreign import AbstractNumpyDeformer
+from ..deformers.lattice import Lattice
+from ..mesh.joined import joined_points
+from ..numerics.taylor import Remainder, remainder
+from .pipeline import Pipeline, Values
+
+SAMPLES = 4
+"""Samples per cell and axis where a lattice's box is searched for folds."""
+
+MOST_SAMPLES = 200_000
+
+
+@dataclass(frozen=True)
+class Folding:
+    """The smallest Jacobian determinant of a map of space; 1 is no change, below 0 is folded over.
+
+    Attributes
+    ----------
+    smallest
+        Over the geometry's points and a grid of samples in every lattice's box.
+    place
+        Where that is, before the deformation [m].
+    at_points
+        The smallest over the geometry's own points.
+    samples
+        How many places were looked at.
+    """
+
+    smallest: float
+    place: tuple[float, float, float]
+    at_points: float
+    samples: int
+
+    @property
+    def folds(self) -> bool:
+        """Whether space is turned inside out anywhere looked at."""
+        return self.smallest <= 0.0
+
+
+@dataclass(frozen=True)
+class Tear:
+    """A stage that pulls a mesh apart where it leaves the stage's box."""
+
+    stage: str
+    edges: int
+    widest: float
+    place: tuple[float, float, float]
+
+    def __str__(self) -> str:
+        x, y, z = self.place
+        return (
+            f"stage {self.stage!r} tears the mesh: {self.edges} edges leave its box where it moves, "
+            f"by up to {self.widest:.3g} near ({x:.4g}, {y:.4g}, {z:.4g}); freeze that side, "
+            f"enlarge the box or let outside = \"extend\""
+        )
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The derivatives of a case, proved along one direction.
+
+    Attributes
+    ----------
+    forward
+        Taylor remainder of the points along random changes of all variables.
+    mismatch
+        Relative difference of forward and reverse derivatives, <w, J d> against <J'w, d>.
+    method
+        "exact", or what stages written in NumPy fall back to.
+    """
+
+    forward: Remainder
+    mismatch: float
+    method: str
+
+    @property
+    def is_right(self) -> bool:
+        """Whether both derivatives are proved."""
+        return self.forward.is_right and self.mismatch < 1e-6
+
+
+def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
+    """Search a deformation for folds; a sampled answer, which small folds between samples escape."""
+    points = np.asarray(pipeline.geometry.points)
+    boxes = [_samples(stage.deformer) for stage in pipeline.own_stages]
+    places = np.concatenate([points, *boxes])
+    slopes, present = np.broadcast_to(np.eye(3), (len(places), 3, 3)), jnp.asarray(places)
+    full = pipeline.values(values)
+    for stage in pipeline.own_stages:
+        controls = stage.controls(full)
+        slopes = np.asarray(map_slopes(stage.deformer, present, controls)) @ slopes
+        present = stage.deformer.follow(present, controls)
+    determinants = np.linalg.det(slopes)
+    worst = int(determinants.argmin())
+    return Folding(
+        float(determinants[worst]),
+        _place(places[worst]),
+        float(determinants[: len(points)].min()),
+        len(places),
+    )
+
+
+def _samples(deformer: Any) -> np.ndarray:
+    """A grid of places in a lattice's box, none elsewhere."""
+    if not isinstance(deformer, Lattice):
+        return np.empty((0, 3))
+    most = int(MOST_SAMPLES ** (1 / 3))
+    lines = [
+        np.linspace(0, 1, min(most, SAMPLES * (len(axis.starts) - 2) + 1)) if axis.count > 1
+        else np.array([0.5])
+        for axis in deformer.axes
+    ]  # fmt: skip
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+    return deformer.origin + grid @ deformer.edges
+
+
+def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
+    """Stages that tear the mesh where it leaves their boxes."""
+    edges = joined_points(pipeline.geometry)
+    found = []
+    full = pipeline.values(values)
+    present = np.asarray(pipeline.geometry.points)
+    size = float(np.ptp(present, axis=0).max())
+    for stage in pipeline.own_stages:
+        controls = stage.controls(full)
+        if isinstance(stage.deformer, Lattice):
+            places, gaps = stage.deformer.tears(present, edges, controls)
+            torn = np.flatnonzero(gaps > 1e-9 * size)
+            if len(torn):
+                widest = int(gaps.argmax())
+                tear = Tear(stage.name, len(torn), float(gaps[widest]), _place(places[widest]))
+                found.append(tear)
+        present = np.asarray(stage.deformer.follow(present, controls))
+    return found
+
+
+def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Proof:
+    """Prove the derivatives at these values along a random direction of typical size."""
+    rng = np.random.default_rng(seed)
+    full = pipeline.values(values)
+    along = {
+        name: jnp.asarray(variable.typical * rng.uniform(-1, 1, variable.size))
+        for name, variable in pipeline.variables.items()
+    }
+    foreign = [s for s in pipeline.own_stages if isinstance(s.deformer, AbstractNumpyDeformer)]
+    methods = {s.deformer.method(pipeline.geometry.points, s.controls(full)) for s in foreign}
+    accuracy = 1e-7 if "central differences" in methods else 0.0
+    weights = rng.normal(size=pipeline.geometry.points.shape)
+    pushed = float(np.vdot(weights, np.asarray(pipeline.pushforward(full, along))))
+    pulled = pipeline.pullback(full, weights)
+    dotted = float(sum(np.vdot(pulled[name], along[name]) for name in along))
+    scale = max(abs(pushed), abs(dotted), 1e-300)
+    return Proof(
+        remainder(pipeline.points, full, along, accuracy),
+        abs(pushed - dotted) / scale,
+        ", ".join(sorted(methods)) or "exact",
+    )
+
+
+def _place(point: np.ndarray) -> tuple[float, float, float]:
+    return float(point[0]), float(point[1]), float(point[2])
+
+
+def turned_faces(pipeline: Pipeline, values: Values | None = None) -> np.ndarray:
+    """Faces of a surface whose normals the deformation turns by more than 90 degrees."""
+    before, after = (
+        _normals(np.asarray(points), np.asarray(pipeline.geometry.faces))
+        for points in (pipeline.geometry.points, pipeline.points(values))
+    )
+    return np.flatnonzero(np.einsum("ij,ij->i", before, after) < 0)
+
+
+def _normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
+    return np.cross(b - a, c - a)

@@ -1,0 +1,82 @@
+"""One step of a pipeline: a deformer, and the links that turn variables into its controls."""
+
+from collections.abc import Mapping
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Float
+
+from .._types import Array, Points, Vector
+from ..deformers.base import AbstractDeformer
+from ..errors import ParameterError
+from ..parameters.link import Across, Link
+from ..parameters.variable import Variable
+
+
+class Stage(eqx.Module):
+    """A deformer with its links.
+
+    Attributes
+    ----------
+    deformer
+        What moves the points.
+    links
+        For each variable the link to the deformer's controls; what several variables do adds up.
+    on
+        Name of the geometry that it acts on; "" is the only one of a pipeline.
+    name
+        What reports call it.
+    """
+
+    deformer: AbstractDeformer
+    links: dict[Variable, Link]
+    on: str = eqx.field(static=True)
+    name: str = eqx.field(static=True)
+
+    def __init__(
+        self,
+        deformer: AbstractDeformer,
+        links: Mapping[Variable, Link],
+        on: str = "",
+        name: str = "",
+    ):
+        self.deformer = deformer
+        self.links = dict(links)
+        self.on = on
+        self.name = name or type(deformer).__name__.lower()
+
+    def __check_init__(self) -> None:
+        for variable, link in self.links.items():
+            needed = (self.deformer.size, variable.size)
+            if link.matrix.shape != needed:
+                raise ParameterError(
+                    f"stage {self.name!r}: the link of variable {variable.name!r} "
+                    f"({variable.size} numbers) to {self.deformer.size} controls must have the "
+                    f"shape {needed}, got {link.matrix.shape}"
+                )
+
+    @property
+    def across(self) -> Across | None:
+        """The plane of symmetry that all links respect, if there is one."""
+        planes = {link.across for link in self.links.values()}
+        return planes.pop() if len(planes) == 1 else None
+
+    @property
+    def settles(self) -> bool:
+        """Whether the deformer must see the present surface before it knows its controls."""
+        return type(self.deformer).settle is not AbstractDeformer.settle
+
+    def controls(self, values: Mapping[str, Float[Array, "v"]]) -> Vector:
+        """Controls from the variables' values, given in the designer's units."""
+        total = jnp.asarray(self.deformer.neutral)
+        for variable, link in self.links.items():
+            total = total + link.matrix @ (values[variable.name] * variable.factor)
+        return total
+
+    def held(self, rest: Points, moved: Points) -> Points:
+        """Points on the plane of symmetry put back on it, which only undoes rounding."""
+        if self.across is None:
+            return moved
+        axis = "xyz".index(self.across)
+        on_plane = rest[:, axis] == 0.0
+        return jnp.asarray(moved).at[:, axis].set(jnp.where(on_plane, 0.0, moved[:, axis]))

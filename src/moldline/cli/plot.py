@@ -2,18 +2,71 @@
 
 import argparse
 from pathlib import Path
+from typing import Any
+
+from . import values
 
 HELP = "Draw a geometry, or a case before and after, or its sensitivity to one number."
 EXAMPLE = """\
   moldline plot examples/data/transport_wing.tri -o wing.png
-  moldline plot examples/transport_wing.toml --set thickness[3]=0.3 -o moved.png
-  moldline plot examples/transport_wing.toml --sensitivity droop -o sensitivity.png"""
+  moldline plot examples/transport_wing.toml -o before_and_after.png
+  moldline plot examples/transport_wing.toml --sensitivity 'droop[1]' --view top -o map.png
+  moldline plot examples/transport_wing.toml --cuts 5,15,25 -o sections.png"""
 
 
 def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
+    values.configure(command)
+    command.add_argument("-o", "--output", type=Path, help="picture: .png, .svg or .pdf")
+    command.add_argument("--view", default="iso", help="iso, top, bottom, front, rear or side")
+    command.add_argument(
+        "--sensitivity", metavar="NUMBER", help="colour by the derivative, e.g. droop or droop[1]"
+    )
+    command.add_argument("--cuts", metavar="Y,Y,...", help="draw sections at these y instead")
+    command.add_argument("--window", action="store_true", help="an interactive window (PyVista)")
 
 
 def run(given: argparse.Namespace) -> int:
     """Do it."""
-    raise NotImplementedError(Path)
+    from ..errors import ParameterError
+    from ..plot.figure import save
+
+    if (given.output is None) != given.window:
+        raise ParameterError("give -o FILE for a picture, or --window for a window")
+    if given.window:
+        return _window(given)
+    save(_picture(given), given.output)
+    print(given.output)
+    return 0
+
+
+def _picture(given: argparse.Namespace) -> Any:
+    from ..case import load
+    from ..mesh.io import read
+    from ..plot import pictures
+
+    title = given.case.stem.replace("_", " ")
+    if given.case.suffix.lower() != ".toml":
+        return pictures.of_geometry(read(given.case), given.view, title)
+    case = load(given.case)
+    chosen = values.chosen(case, given)
+    if given.sensitivity:
+        number = given.sensitivity
+        return pictures.of_sensitivity(case.pipeline, chosen, number, given.view, title)
+    if given.cuts:
+        return pictures.of_cuts(case.pipeline, chosen, values.numbers(given.cuts, "--cuts"))
+    return pictures.of_deformation(case.pipeline, chosen, given.view, title)
+
+
+def _window(given: argparse.Namespace) -> int:
+    from ..case import load
+    from ..mesh.io import read
+    from ..plot import window
+
+    if given.case.suffix.lower() == ".toml":
+        case = load(given.case)
+        shape = case.pipeline(values.chosen(case, given))
+    else:
+        shape = read(given.case)
+    window.show(shape)
+    return 0

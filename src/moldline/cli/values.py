@@ -33,15 +33,15 @@ def chosen(case: "Case", given: argparse.Namespace) -> dict[str, Any]:
         changes.update(_from_file(given.values))
     own = case.pipeline.variables
     for text in given.changes:
-        name, index, numbers = _assignment(text)
+        name, index, given_numbers = _assignment(text)
         if index is None:
-            changes[name] = numbers
+            changes[name] = given_numbers
             continue
-        if name not in own or index >= own[name].size or len(numbers) != 1:
+        if name not in own or index >= own[name].size or len(given_numbers) != 1:
             size = own[name].size if name in own else 0
             raise _problem(f"--set {text}: {name!r} has {size} numbers, counted from 0")
         present = list(changes.get(name, own[name].value))
-        present[index] = numbers[0]
+        present[index] = given_numbers[0]
         changes[name] = present
     return case.values(changes)
 
@@ -50,11 +50,15 @@ def _assignment(text: str) -> tuple[str, int | None, list[float]]:
     match = re.fullmatch(r"\s*(\w+)\s*(?:\[(\d+)\])?\s*=(.+)", text)
     if match is None:
         raise _problem(f"--set {text}: expected NAME=VALUE, NAME=V,V,... or NAME[i]=VALUE")
+    return match[1], int(match[2]) if match[2] else None, numbers(match[3], f"--set {text}")
+
+
+def numbers(text: str, where: str) -> list[float]:
+    """Numbers between commas."""
     try:
-        numbers = [float(part) for part in match[3].split(",")]
+        return [float(part) for part in text.split(",")]
     except ValueError:
-        raise _problem(f"--set {text}: {match[3]!r} is not a list of numbers") from None
-    return match[1], int(match[2]) if match[2] else None, numbers
+        raise _problem(f"{where}: {text!r} is not a list of numbers") from None
 
 
 def _from_file(path: Path) -> dict[str, Any]:

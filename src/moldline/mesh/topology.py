@@ -96,17 +96,17 @@ def boundary_loops(faces: Array) -> list[Int[np.ndarray, "l"]]:
 
 def nonmanifold_vertices(faces: Array) -> Int[np.ndarray, "v"]:
     """Points at which two or more fans of faces touch without sharing an edge, ascending."""
-    faces = np.asarray(faces)
-    faces = faces[_is_proper(faces)]
-    sides = _sides(faces)
+    proper = np.asarray(faces)
+    proper = proper[_is_proper(proper)]
+    sides = _sides(proper)
     twin = np.flatnonzero(~sides.is_new)  # shares its edge with the side before it
     low, high = np.minimum(sides.start, sides.end), np.maximum(sides.start, sides.end)
     here, before = sides.face[twin], sides.face[twin - 1]
-    first = [3 * here + _corner(faces, here, end[twin]) for end in (low, high)]
-    second = [3 * before + _corner(faces, before, end[twin]) for end in (low, high)]
-    number, fans = _joined(np.concatenate(first), np.concatenate(second), faces.size)
+    first = [3 * here + _corner(proper, here, end[twin]) for end in (low, high)]
+    second = [3 * before + _corner(proper, before, end[twin]) for end in (low, high)]
+    number, fans = _joined(np.concatenate(first), np.concatenate(second), proper.size)
     point_of_fan = np.empty(number, np.int64)
-    point_of_fan[fans] = faces.ravel()
+    point_of_fan[fans] = proper.ravel()
     return np.flatnonzero(np.bincount(point_of_fan) > 1)
 
 

@@ -69,7 +69,10 @@ def clamped(
     offsets = breaks[:-1] + centre * widths
     basis = BSpline(knots, np.eye(count), degree)
     powers = np.stack(
-        [basis(offsets, nu=a) * widths[:, None] ** a / math.factorial(a) for a in range(degree + 1)],
+        [
+            basis(offsets, nu=a) * widths[:, None] ** a / math.factorial(a)
+            for a in range(degree + 1)
+        ],
         axis=1,
     )
     rest = np.array([knots[k + 1 : k + degree + 1].mean() for k in range(count)])
@@ -96,9 +99,7 @@ def even(count: int, outside: Outside) -> Axis:
 
 def _constant() -> Axis:
     """One control point: it moves everything, wherever it is."""
-    return Axis(
-        np.array([0.5]), np.array([-np.inf]), np.zeros(1), np.zeros(1), np.ones((1, 1, 1))
-    )
+    return Axis(np.array([0.5]), np.array([-np.inf]), np.zeros(1), np.zeros(1), np.ones((1, 1, 1)))
 
 
 def _enclosed(

@@ -11,18 +11,21 @@ from typing import NamedTuple
 import numpy as np
 
 from .bspline import Axis
-from .cellwise_loops import (
-    follow_loop,
-    forward_loop,
-    moments_loop,
-    product,
-    pull_loop,
-    push_loop,
-)
+from . import cellwise_loops as loops
 from .kernel import empty
 from .threads import spread
 
 Axes = tuple[Axis, Axis, Axis]
+
+THREAD_WORTH = 16384
+"""Points that are worth a thread of their own."""
+
+
+def _terms(table: np.ndarray) -> loops.Terms:
+    """The size of the polynomials of a table (cells, 3, P, Q, R), as the loops want it."""
+    p, q, r = table.shape[2:]
+    return (0,) * p, (0,) * q, (0,) * r
+
 
 def coefficients(axes: Axes, moves: np.ndarray) -> np.ndarray:
     """Polynomial coefficients (cells, 3, P, Q, R) from control displacements (nu, nv, nw, 3)."""
@@ -51,7 +54,7 @@ def _along(matrix: np.ndarray, table: np.ndarray, axis: int) -> np.ndarray:
     would slow the loops that follow.
     """
     front = np.ascontiguousarray(np.moveaxis(table, axis, 0))
-    result = product(np.ascontiguousarray(matrix), front.reshape(len(front), -1))
+    result = loops.product(np.ascontiguousarray(matrix), front.reshape(len(front), -1))
     return np.moveaxis(result.reshape(-1, *front.shape[1:]), 0, axis)
 
 
@@ -81,9 +84,7 @@ def blocks(axes: Axes, u: np.ndarray) -> Blocks:
     used, first, inside = np.unique(key[order], return_index=True, return_counts=True)
     size = _block_size(len(u), len(used))
     needed = -(-inside // size)
-    place = np.arange(len(u)) + np.repeat(
-        size * (np.cumsum(needed) - needed) - first, inside
-    )
+    place = np.arange(len(u)) + np.repeat(size * (np.cumsum(needed) - needed) - first, inside)
     rows = int(needed.sum())
     sorted_order = np.full(rows * size, -1, np.int32)
     sorted_order[place] = order
@@ -107,16 +108,17 @@ def displaced(b: Blocks, table: np.ndarray, rest: np.ndarray | None) -> np.ndarr
     """Displacements of the blocks' points in their own order, added to `rest` where given."""
     out = empty((b.count, 3))
     base = np.empty((0, 3)) if rest is None else rest
-    loop = forward_loop(table.shape[2:])
-    spread(loop, len(b.cells), *b[:5], table, base, out, least=16384 // b.x.shape[1])
+    least = THREAD_WORTH // b.x.shape[1]
+    spread(loops.forward, len(b.cells), _terms(table), *b[:5], table, base, out, least=least)
     return out
 
 
 def moments(b: Blocks, axes: Axes, vectors: np.ndarray) -> np.ndarray:
     """Per cell the sum over its points of vector times monomials: shape (cells, 3, P, Q, R)."""
-    loop = moments_loop((axes[0].terms, axes[1].terms, axes[2].terms))
+    terms = tuple((0,) * axis.terms for axis in axes)
     cells = int(np.prod([len(axis.starts) for axis in axes]))
-    parts = spread(loop, len(b.cells), *b[:5], vectors, cells, least=16384 // b.x.shape[1])
+    least = THREAD_WORTH // b.x.shape[1]
+    parts = spread(loops.moments, len(b.cells), terms, *b[:5], vectors, cells, least=least)
     return sum(parts[1:], parts[0])
 
 
@@ -144,7 +146,9 @@ class Box(NamedTuple):
 def followed(box: Box, table: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points moved by the field, each evaluated where it is now."""
     out = empty(points.shape)
-    spread(follow_loop(table.shape[2:]), len(points), *box, table, points, out, least=4096)
+    spread(
+        loops.follow, len(points), _terms(table), *box, table, points, out, least=THREAD_WORTH // 4
+    )
     return out
 
 
@@ -153,8 +157,8 @@ def pushed(
 ) -> np.ndarray:
     """Derivative of `followed` along a change of the coefficients and a motion of the points."""
     out = empty(points.shape)
-    loop = push_loop(table.shape[2:])
-    spread(loop, len(points), *box, table, change, points, motion, out, least=4096)
+    arguments = _terms(table), *box, table, change, points, motion, out
+    spread(loops.push, len(points), *arguments, least=THREAD_WORTH // 4)
     return out
 
 
@@ -163,8 +167,6 @@ def pulled(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The transpose of `pushed`: cotangents of the points, and moments per cell."""
     out = empty(points.shape)
-    loop = pull_loop(table.shape[2:])
-    parts = spread(loop, len(points), *box, table, points, vectors, out, least=4096)
+    arguments = _terms(table), *box, table, points, vectors, out
+    parts = spread(loops.pull, len(points), *arguments, least=THREAD_WORTH // 4)
     return out, sum(parts[1:], parts[0])
-
-

@@ -127,4 +127,3 @@ mlir.register_lowering(
     mlir.lower_fun(_called_back, multiple_results=True),
     platform="cpu",
 )
-

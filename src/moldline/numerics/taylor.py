@@ -27,9 +27,7 @@ class Remainder(NamedTuple):
         return self.is_linear or abs(self.order - 2) < 0.1
 
 
-def remainder(
-    f: Callable[[Any], Any], at: Any, along: Any, accuracy: float = 0.0
-) -> Remainder:
+def remainder(f: Callable[[Any], Any], at: Any, along: Any, accuracy: float = 0.0) -> Remainder:
     """Taylor remainder |f(x + h d) - f(x) - h f'(x) d| for falling steps h.
 
     `at` and `along` are arrays or dictionaries of arrays; f gives one array. The order is the slope

@@ -1,6 +1,7 @@
 """The usual links: single controls, groups, thickness, camber, radius, mirrored pairs.
 
-A lattice's axes are named x, y, z along its own edges. All displacements are in metres.
+A lattice's axes are named x, y, z along its own edges. All displacements are in metres. A station
+is a row of control points across an axis; those that the lattice freezes get no number.
 """
 
 from collections.abc import Sequence
@@ -29,7 +30,8 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
 def each(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
     """One number for each chosen control point: its displacement along an axis.
 
-    `where` is as for `group`; without it all control points are chosen, in the order of their array.
+    `where` is as for `group`; without it all control points that are not frozen are chosen, in the
+    order of their array.
     """
     chosen = chosen_controls(lattice, **where)
     motion = np.zeros((lattice.size // 3, 3, len(chosen)))
@@ -115,14 +117,18 @@ def _stations(lattice: Lattice, along: Any, axis: AxisName, share: np.ndarray) -
 
 
 def _by_station(lattice: Lattice, along: tuple[str, ...], motion: Array) -> np.ndarray:
-    """One column per station: the motion of its controls; the first axis of `along` runs slowest."""
+    """One column per station: the motion of its controls; the first axis of `along` runs slowest.
+
+    Stations where every control is frozen have no column.
+    """
     order = [AXES[name] for name in along]
     counts = [lattice.shape[i] for i in order]
     index = np.indices(lattice.shape)
     station = np.ravel_multi_index(tuple(index[i] for i in order), counts)
     columns = np.zeros((*lattice.shape, 3, int(np.prod(counts))))
     np.put_along_axis(columns, station[..., None, None], motion[..., None], axis=-1)
-    return columns.reshape(lattice.size, -1)
+    free = np.unique(station[~lattice.frozen])
+    return columns.reshape(lattice.size, -1)[:, free]
 
 
 def chosen_controls(
@@ -147,7 +153,7 @@ def chosen_controls(
     elif near is not None:
         chosen = np.flatnonzero(np.linalg.norm(places - np.asarray(near), axis=1) <= radius)
     else:
-        return np.arange(len(places))
+        return np.flatnonzero(~lattice.frozen.ravel())
     if len(chosen) == 0:
         raise ParameterError(
             f"no control point there; the lattice reaches from {places.min(axis=0).tolist()} "

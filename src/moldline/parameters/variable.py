@@ -16,7 +16,7 @@ UNITS = {
 """What one unit is inside moldline (SI and radians)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, order=True)
 class Variable:
     """One name for one or several numbers, in the designer's own unit.
 

@@ -16,7 +16,7 @@ class Part(NamedTuple):
 
     kind: str
     """`i` or `f`."""
-    count: int
+    length: int
 
 
 class Layout(NamedTuple):
@@ -40,7 +40,7 @@ class Layout(NamedTuple):
 
     def size(self, parts: Sequence[Part]) -> int:
         """Bytes that a file of these parts has."""
-        return sum(p.count * self.type(p.kind).itemsize + 8 * self.records for p in parts)
+        return sum(p.length * self.type(p.kind).itemsize + 8 * self.records for p in parts)
 
     def integers(self, data: bytes, record: int, count: int) -> list[int] | None:
         """The first integers of a file, if its first record is of `record` integers."""
@@ -60,12 +60,13 @@ class Layout(NamedTuple):
         arrays, at = [], 0
         for part in parts:
             dtype = self.type(part.kind)
-            size = part.count * dtype.itemsize
+            size = part.length * dtype.itemsize
             if self.records:
                 self._check_markers(data, at, size, path)
                 at += 4
-            found = np.frombuffer(data, dtype, part.count, at)
-            arrays.append(found.astype(np.float64 if part.kind == "f" else np.int32))
+            found = np.frombuffer(data, dtype, part.length, at)
+            with np.errstate(invalid="ignore"):  # NaN of any kind is the caller's to refuse
+                arrays.append(found.astype(np.float64 if part.kind == "f" else np.int32))
             at += size + 4 * self.records
         return arrays
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import IO
+from typing import BinaryIO
 
 from ...errors import FileError
 
@@ -41,7 +41,7 @@ def head(path: Path | str) -> bytes:
 
 
 @contextmanager
-def replacing(path: Path | str) -> Iterator[IO[bytes]]:
+def replacing(path: Path | str) -> Iterator[BinaryIO | gzip.GzipFile]:
     """A file to write to, which takes the place of `path` when all went well.
 
     It lies beside the target until then, so that a full disk or an error leaves the old file

@@ -80,7 +80,7 @@ def read(path: Path | str) -> Grid:
     if text.is_text(data[:4096]):
         values = text.numbers(data, path)
         header = _fitting(list(_text_headers(values, data)), values, path)
-        ends = np.cumsum([p.count for p in header.parts])
+        ends = np.cumsum([p.length for p in header.parts])
         blocks = np.split(values, ends)[len(header.lengths) : -1]
         return _grid([p.reshape(header.coordinates, -1) for p in blocks], header.shapes, path)
     fit = layouts.fitting(_fits(data), len(data), path)
@@ -105,7 +105,7 @@ def write(
     blocks = [block.T.ravel() for block in np.split(points, ends)]
     arrays = [np.array([len(blocks)]), np.array(grid.shapes), *blocks]
     if binary is None:
-        pieces = (line for array in arrays for line in _lines(array))
+        pieces: Iterator[bytes] = (line for array in arrays for line in _lines(array))
     else:
         pieces = layouts.chosen(binary, records, precision).joined(arrays, path)
     with replacing(path) as file:

@@ -110,7 +110,8 @@ def _read_binary(data: bytes, path: Path | str) -> np.ndarray:
             "was the copy cut short?"
         )
     records = np.frombuffer(data, _RECORD, offset=84)
-    return records["corners"].reshape(-1, 3).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # NaN of any kind is refused later
+        return records["corners"].reshape(-1, 3).astype(np.float64)
 
 
 def _read_text(data: bytes, path: Path | str) -> tuple[np.ndarray, np.ndarray, tuple[str, ...]]:

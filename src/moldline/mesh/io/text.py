@@ -62,7 +62,7 @@ def rows(text: bytes, path: Path | str, line: int = 1) -> Rows:
 
 
 def indices(
-    values: Array, count: int, path: Path | str, place: Callable[[int], str], base: int = 1
+    values: np.ndarray, count: int, path: Path | str, place: Callable[[int], str], base: int = 1
 ) -> np.ndarray:
     """Numbers that refer to one of `count` things, made to count from 0.
 
@@ -75,7 +75,7 @@ def indices(
             f"{path}: {place(int(found[0]))} refers to {values[tuple(found)]:.15g}, expected a "
             f"whole number from {base} to {count + base - 1}"
         )
-    return (values - base).astype(np.int32)
+    return np.asarray(values - base, np.int32)
 
 
 def count_of(value: float, path: Path | str, what: str, least: int = 1) -> int:

@@ -63,8 +63,9 @@ def sniff(head: bytes, path: Path | str) -> bool:
     if len(point) != 3 or not all(map(text.is_number, point)):
         return False
     counts = [int(word[:10]) for word in header] + [0] * (3 - len(header))
-    parts = (Counts(*counts, has_ids).parts for has_ids in (False, True))
-    return text.may_hold(head, path, [len(header) + sum(p.count for p in some) for some in parts])
+    points, faces, scalars = counts
+    parts = (Counts(points, faces, scalars, has_ids).parts for has_ids in (False, True))
+    return text.may_hold(head, path, [len(header) + sum(p.length for p in some) for some in parts])
 
 
 def read(path: Path | str) -> Surface:
@@ -100,7 +101,7 @@ def write(
     with replacing(path) as file:
         if binary is None:
             file.write(" ".join(map(str, header)).encode() + b"\n")
-            pieces = (line for array in arrays for line in text.written(array))
+            pieces: Iterator[bytes] = (line for array in arrays for line in text.written(array))
         else:
             layout = layouts.chosen(binary, records, precision)
             pieces = layout.joined([np.array(header), *arrays], path)
@@ -128,7 +129,7 @@ def _read_text(data: bytes, path: Path | str) -> Surface:
     header = len(text.first_lines(data[:4096], 1)[0])
     lengths = (header,) if header in (2, 3) else (2, 3)
     options = [option for length in lengths for option in _options(values, length, path)]
-    sizes = [length + sum(p.count for p in counts.parts) for length, counts in options]
+    sizes = [length + sum(p.length for p in counts.parts) for length, counts in options]
     if len(values) not in sizes:
         need = min((size for size in sizes if size > len(values)), default=max(sizes))
         counts = options[sizes.index(need)][1]
@@ -137,7 +138,7 @@ def _read_text(data: bytes, path: Path | str) -> Surface:
             f"{path}: {counts} need {need} numbers, the file has {len(values)}; {advice}"
         )
     length, counts = options[sizes.index(len(values))]
-    ends = np.cumsum([length] + [p.count for p in counts.parts])
+    ends = np.cumsum([length] + [p.length for p in counts.parts])
     return _surface(counts, np.split(values, ends)[1:-1], path)
 
 

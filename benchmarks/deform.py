@@ -1,0 +1,165 @@
+"""Time of a lattice deformation and its derivatives, beside a copy of the same bytes.
+
+usage: python benchmarks/deform.py [--markdown] [--sizes 1300 48000 ...]
+
+Each row runs in a process of its own. Times are medians in milliseconds; `x` are multiples of the
+copy (`numpy.copyto` of the coordinates into an array that is there already) of the same row.
+Blender's lattice modifier is timed in the same run where `make blender` has made its environment.
+"""
+
+import argparse
+import multiprocessing
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+SIZES = (1_300, 6_000, 48_000, 127_000, 185_000, 1_000_000)
+PAPER = {1_300: 2.0, 6_000: 9.0, 48_000: 73.0, 127_000: 191.0, 185_000: 289.0}
+"""The paper's Table 1, 27-point lattice on a Core 2 Duo laptop [ms]; the 10x10x10 is not in it."""
+
+ROOT = Path(__file__).parent.parent
+BLENDER = ROOT / ".venv-blender/bin/python"
+COLUMNS = (
+    "vertices", "lattice", "embed", "copy", "deform", "x", "JVP", "VJP", "VJP/deform",
+    "follow", "follow/deform", "follow VJP", "bytes/vertex", "Blender", "Blender/deform", "paper",
+)  # fmt: skip
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
+    parser.add_argument("--markdown", action="store_true", help="a table for the docs")
+    given = parser.parse_args()
+    separator = " | " if given.markdown else "  "
+    widths = [max(len(name), 8) for name in COLUMNS]
+    _line(COLUMNS, widths, separator, given.markdown)
+    if given.markdown:
+        _line(["---:"] * len(COLUMNS), widths, separator, True)
+    context = multiprocessing.get_context("spawn")
+    for count in (3, 10):
+        for size in given.sizes:
+            with context.Pool(1) as pool:
+                row = pool.apply(measured, (size, count))
+            _line([_told(row.get(name)) for name in COLUMNS], widths, separator, given.markdown)
+
+
+def measured(size: int, count: int) -> dict[str, float | str]:
+    """One row."""
+    import jax
+
+    import moldline as ml
+
+    _warm(count)
+    base = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    points = surface_points(size)
+    lattice = ml.Lattice.around(points, (count,) * 3)
+    rng = np.random.default_rng(0)
+    controls = 0.01 * rng.normal(size=lattice.size)
+    vectors = rng.normal(size=points.shape)
+    target = np.empty_like(points)
+    start = time.perf_counter()
+    binding = lattice.bind(points)
+    embed = 1e3 * (time.perf_counter() - start)
+    copy = median(lambda: np.copyto(target, points))
+    deform = median(lambda: binding(controls))
+    push = jax.linearize(binding, controls)[1]
+    pull = jax.vjp(binding, controls)[1]
+    row: dict[str, float | str] = {
+        "vertices": len(points), "lattice": f"{count}x{count}x{count}", "embed": embed,
+        "copy": copy, "deform": deform, "x": deform / copy,
+        "JVP": median(lambda: push(controls)), "VJP": median(lambda: pull(vectors)),
+    }  # fmt: skip
+    row["VJP/deform"] = row["VJP"] / deform
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - base
+    row["bytes/vertex"] = 1024 * peak / len(points)
+    follow = median(lambda: lattice.follow(points, controls))
+    follow_pull = jax.vjp(lattice.follow, points, controls)[1]
+    row |= {"follow": follow, "follow/deform": follow / deform}
+    row["follow VJP"] = median(lambda: follow_pull(vectors), 7)
+    blender = blender_time(points, count)
+    if blender is not None:
+        row |= {"Blender": blender, "Blender/deform": blender / deform}
+    if count == 3 and size in PAPER:
+        row["paper"] = PAPER[size]
+    return row
+
+
+def surface_points(size: int) -> np.ndarray:
+    """Vertices of a closed smooth surface in the order in which a mesh has them."""
+    rows = int(np.sqrt(size / 2))
+    u, v = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 2 * rows, endpoint=False), np.linspace(0.01, np.pi - 0.01, rows)
+    )
+    xyz = np.cos(u) * np.sin(v), 3 * np.sin(u) * np.sin(v), 0.3 * np.cos(v)
+    return np.stack(xyz, axis=-1).reshape(-1, 3)
+
+
+def blender_time(points: np.ndarray, count: int) -> float | None:
+    """Median time of Blender's lattice modifier [ms], None where it is not there."""
+    script = Path(__file__).parent / "blender_lattice.py"
+    if not BLENDER.exists() or not script.exists():
+        return None
+    low, high = points.min(axis=0), points.max(axis=0)
+    lines = [np.linspace(a, b, count) for a, b in zip(low, high, strict=True)]
+    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
+    rest = grid.transpose(2, 1, 0, 3).reshape(-1, 3)  # Blender's order: the first axis runs fastest
+    moved = rest + 0.01 * np.random.default_rng(0).normal(size=rest.shape)
+    with tempfile.TemporaryDirectory() as folder:
+        given, result = Path(folder) / "in.npz", Path(folder) / "out.npz"
+        np.savez(given, points=points, shape=np.full(3, count), rest=rest, moved=moved)
+        done = subprocess.run(
+            [BLENDER, script, given, result], capture_output=True, text=True, timeout=600
+        )
+        if done.returncode:
+            print(done.stderr[-500:], file=sys.stderr)
+            return None
+        return 1e3 * float(np.median(np.load(result)["seconds"]))
+
+
+def median(call: Callable[[], object], repeats: int = 21) -> float:
+    """Median time of a call [ms], after one that is not counted."""
+    call()
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return 1e3 * float(np.median(times))
+
+
+def _warm(count: int) -> None:
+    """Compile everything on a few points, so that memory and time are the run's own."""
+    import jax
+
+    import moldline as ml
+
+    points = surface_points(400)
+    lattice = ml.Lattice.around(points, (count,) * 3)
+    binding, controls = lattice.bind(points), np.zeros(lattice.size)
+    jax.linearize(binding, controls)[1](controls)
+    jax.vjp(binding, controls)[1](points)
+    jax.vjp(lattice.follow, points, controls)[1](points)
+
+
+def _told(value: float | str | None) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, str):
+        return value
+    return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
+
+
+def _line(cells: object, widths: list[int], separator: str, markdown: bool) -> None:
+    text = separator.join(str(cell).rjust(w) for cell, w in zip(cells, widths, strict=True))  # type: ignore[call-overload]
+    print(f"| {text} |" if markdown else text, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,23 @@
+"""LOOK: pictures without a display and without OpenGL."""
+
+from .figure import save
+from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
+from .sections import cut, draw_section, section_picture
+from .surfaces import before_and_after, draw_lattice, draw_surface, sensitivity_map
+from .view import View
+
+__all__ = [
+    "View",
+    "before_and_after",
+    "cut",
+    "draw_lattice",
+    "draw_section",
+    "draw_surface",
+    "of_cuts",
+    "of_deformation",
+    "of_geometry",
+    "of_sensitivity",
+    "save",
+    "section_picture",
+    "sensitivity_map",
+]

@@ -1,0 +1,135 @@
+"""Whole pictures of geometries and pipelines."""
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..deformers.lattice import Lattice
+from ..errors import ParameterError
+from ..mesh import Cloud, Geometry, Section, VolumeMesh
+from ..mesh.joined import joined_points
+from ..pipeline.pipeline import Pipeline, Values
+from .figure import blank
+from .sections import draw_section, section_picture
+from .surfaces import before_and_after, draw_edges, draw_surface, sensitivity_map
+from .view import View
+
+
+def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -> Figure:
+    """A geometry as it is."""
+    figure = blank()
+    axes = figure.subplots()
+    axes.set_title(title, fontsize=13)
+    if isinstance(geometry, Section):
+        draw_section(axes, geometry.points)
+    elif isinstance(geometry, Cloud):
+        axes.scatter(*View.of(view).project(geometry.points)[:, :2].T, s=2)
+        axes.set_aspect("equal")
+    elif isinstance(geometry, VolumeMesh):
+        flat = "top" if geometry.dimension == 2 else view
+        draw_edges(axes, geometry.points, joined_points(geometry), flat)
+    else:
+        draw_surface(axes, geometry.points, geometry.faces, view=view)
+    return figure
+
+
+def of_deformation(
+    pipeline: Pipeline, values: Values | None = None, view: View | str = "iso", title: str = ""
+) -> Figure:
+    """A pipeline's geometry before and after, with its lattices."""
+    rest, moved = pipeline.geometry.points, pipeline.points(values)
+    grids = _lattices(pipeline, values)
+    if isinstance(pipeline.geometry, Section):
+        figure = blank(12, 5)
+        axes = figure.subplots()
+        for grid in grids or [None]:
+            draw_section(axes, rest, moved, grid)
+        axes.set_title(title)
+        return figure
+    faces = _faces(pipeline)
+    return before_and_after(rest, moved, faces, grids, view, title)
+
+
+def of_sensitivity(
+    pipeline: Pipeline,
+    values: Values | None,
+    number: str,
+    view: View | str = "iso",
+    title: str = "",
+) -> Figure:
+    """A surface coloured by how far each point moves per unit of one number of a variable.
+
+    The component of largest motion is shown, with its sign. `number` is a variable's name, with
+    an index where it has several.
+    """
+    name, index = _numbered(pipeline, number)
+    variable = pipeline.variables[name]
+    direction = {name: np.eye(variable.size)[index]}
+    motion = np.asarray(pipeline.pushforward(values, direction))
+    axis = int(np.abs(motion).max(axis=0).argmax())
+    grids = _lattices(pipeline, values)
+    unit = f" per {variable.unit}" if variable.unit else ""
+    label = f"d{'xyz'[axis]} / d {variable.labels()[index]}{unit and ' [m' + unit + ']'}"
+    return sensitivity_map(
+        pipeline.points(values),
+        _faces(pipeline),
+        motion[:, axis],
+        label,
+        [moved for _, moved in grids],
+        _highlighted(pipeline, direction),
+        view,
+        title,
+    )
+
+
+def of_cuts(pipeline: Pipeline, values: Values | None, stations: Sequence[float]) -> Figure:
+    """Sections at several y, before (dashed) and after."""
+    rest, moved = pipeline.geometry.points, np.asarray(pipeline.points(values))
+    return section_picture(rest, moved, _faces(pipeline), stations)
+
+
+def _lattices(pipeline: Pipeline, values: Values | None) -> list[tuple[Any, Any]]:
+    full = pipeline.values(values)
+    return [
+        (stage.deformer.rest, np.asarray(stage.deformer.moved(stage.controls(full))))
+        for stage in pipeline.own_stages
+        if isinstance(stage.deformer, Lattice)
+    ]
+
+
+def _highlighted(
+    pipeline: Pipeline, direction: dict[str, np.ndarray]
+) -> list[tuple[int, np.ndarray]]:
+    """Of each lattice the control points that a number moves."""
+    lattices = [s for s in pipeline.own_stages if isinstance(s.deformer, Lattice)]
+    found = []
+    for i, stage in enumerate(lattices):
+        moves = np.zeros(stage.deformer.size)
+        for variable, link in stage.links.items():
+            if variable.name in direction:
+                moves = moves + np.asarray(link.matrix) @ direction[variable.name]
+        free = np.asarray(stage.deformer.moves(moves))
+        found.append((i, np.argwhere(np.any(free != 0, axis=-1))))
+    return found
+
+
+def _numbered(pipeline: Pipeline, number: str) -> tuple[str, int]:
+    match = re.fullmatch(r"(\w+)(?:\[(\d+)\])?", number.strip())
+    labels = [label for v in pipeline.variables.values() for label in v.labels()]
+    if match is None or match[1] not in pipeline.variables:
+        raise ParameterError(f"no number {number!r}; there is: {', '.join(labels)}")
+    index = int(match[2] or 0)
+    if index >= pipeline.variables[match[1]].size:
+        raise ParameterError(f"no number {number!r}; there is: {', '.join(labels)}")
+    return match[1], index
+
+
+def _faces(pipeline: Pipeline) -> np.ndarray:
+    faces = getattr(pipeline.geometry, "faces", None)
+    if faces is None:
+        kind = type(pipeline.geometry).__name__
+        raise ParameterError(f"this picture needs a surface, the case has a {kind}")
+    return np.asarray(faces)

@@ -47,7 +47,10 @@ def refined(table: np.ndarray, intervals: int) -> dict[str, np.ndarray]:
     """Stations between the published ones, which all stay, by linear interpolation."""
     eta = table["eta"]
     parts = np.maximum(1, np.round(np.diff(eta) * intervals)).astype(int)
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(eta, eta[1:], parts)]
+    pieces = [
+        np.linspace(a, b, n, endpoint=False)
+        for a, b, n in zip(eta[:-1], eta[1:], parts, strict=True)
+    ]
     fine = np.append(np.concatenate(pieces), 1.0)
     return {name: np.interp(fine, eta, table[name]) for name in table.dtype.names}
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .deformers.lattice import Lattice
     from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
     from .mesh.io import read, write
+    from .mesh.io.sensitivities import write_sensitivities
     from .parameters import links
     from .parameters.link import Link
     from .parameters.variable import Variable, variable
@@ -50,13 +51,12 @@ _HOMES = {
     "read": "mesh.io",
     "variable": "parameters.variable",
     "write": "mesh.io",
+    "write_sensitivities": "mesh.io.sensitivities",
 }
 
 _MODULES = {"errors", "links", "plot"}
 
-__all__ = [  # noqa: PLE0604 - the names are strings
-    *_HOMES
-]
+__all__ = [*_HOMES]
 
 
 def __getattr__(name: str) -> Any:

@@ -170,9 +170,9 @@ def _link(file: str, where: str, table: schema.LinkTable, deformer: AbstractDefo
     given = schema.checked(model, table.model_extra or {}, file, where)
     if table.link != "controls" and not hasattr(deformer, "rest"):
         raise CaseError(
-            f"{file}: {where}.link: {table.link!r} needs a lattice; use link = \"controls\""
+            f'{file}: {where}.link: {table.link!r} needs a lattice; use link = "controls"'
         )
-    link = function(deformer, **given) * table.scale  # type: ignore[operator]
+    link = function(deformer, **given) * table.scale
     return mirrored(deformer, link, table.mirrored) if table.mirrored else link  # type: ignore
 
 

@@ -16,7 +16,7 @@ VERSION = 1
 """Of the case file's format; a file of another version is refused with a word on what to do."""
 
 Pair = tuple[float, float]
-Unit = Literal[tuple(UNITS)]  # type: ignore[valid-type]
+Unit = Literal[tuple(UNITS)]
 LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
 
 
@@ -54,7 +54,7 @@ class LinkTable(BaseModel):
 
     model_config = ConfigDict(extra="allow")
     variable: str
-    link: Literal[tuple(LINKS)]  # type: ignore[valid-type]
+    link: Literal[tuple(LINKS)]
     scale: float = 1.0
     mirrored: Literal["x", "y", "z"] | None = Field(
         None, description="copy the half on the positive side of this coordinate's plane"
@@ -86,7 +86,7 @@ class CaseTable(Table):
     variable: dict[str, VariableTable] = Field(default_factory=dict)
     stage: list[StageTable] = Field(default_factory=list)
     rider: dict[str, RiderTable] = Field(default_factory=dict)
-    output: OutputTable = Field(default_factory=OutputTable)
+    output: OutputTable = OutputTable()
 
 
 def parse(text: str, file: str) -> CaseTable:
@@ -133,7 +133,10 @@ def json_schema() -> dict[str, Any]:
         "link",
         {name: options.of_link(name, function) for name, function in LINKS.items()},
     )
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "moldline case file"} | schema
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "moldline case file",
+    } | schema
 
 
 def _choice(table: dict[str, Any], key: str, models: dict[str, type[BaseModel]]) -> dict[str, Any]:
@@ -143,7 +146,9 @@ def _choice(table: dict[str, Any], key: str, models: dict[str, type[BaseModel]])
         own = model.model_json_schema()
         branches.append(
             {
-                "properties": table["properties"] | own.get("properties", {}) | {key: {"const": name}},
+                "properties": table["properties"]
+                | own.get("properties", {})
+                | {key: {"const": name}},
                 "required": sorted({*table["required"], *own.get("required", [])}),
                 "additionalProperties": False,
             }

@@ -73,15 +73,12 @@ def _deformation(
 ) -> tuple[dict[str, Any], list[str], bool]:
     from dataclasses import asdict
 
-    from ..mesh import Surface
     from ..pipeline import examine
 
     fold = examine.folding(pipeline, chosen)
     torn = examine.tears(pipeline, chosen)
     proof = examine.proof(pipeline, chosen)
-    turned = (
-        examine.turned_faces(pipeline, chosen) if isinstance(pipeline.geometry, Surface) else []
-    )
+    turned = examine.turned_faces(pipeline, chosen)
     x, y, z = fold.place
     order = "linear, remainder at rounding" if proof.forward.is_linear else (
         f"order {proof.forward.order:.3f} of the Taylor remainder (2 is right)"

@@ -28,7 +28,7 @@ def run(given: argparse.Namespace) -> int:
 
     from ..case import load
     from ..errors import ParameterError
-    from ..mesh.io import sensitivities
+    from ..mesh.io.sensitivities import write_sensitivities
 
     case = load(given.case)
     chosen = values.chosen(case, given)
@@ -41,7 +41,7 @@ def run(given: argparse.Namespace) -> int:
         for name in names
         for label, column in case.pipeline.labelled_sensitivity(chosen, name).items()
     }
-    sensitivities.write(target, case.pipeline(chosen), columns, units=case.units)
+    write_sensitivities(target, case.pipeline(chosen), columns, units=case.units)
     largest = {k: float(np.linalg.norm(c, axis=1).max()) for k, c in columns.items()}
     reach = {k: int(np.count_nonzero(np.any(c != 0, axis=1))) for k, c in columns.items()}
     report = {"file": str(target), "largest": largest, "points_moved": reach}

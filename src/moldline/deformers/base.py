@@ -2,7 +2,7 @@
 
 import abc
 import inspect
-from typing import Any, Self
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -56,7 +56,7 @@ class AbstractDeformer(eqx.Module):
         return controls
 
     @classmethod
-    def build(cls, geometry: Any, **options: Any) -> Self:
+    def build(cls, geometry: Any, **options: Any) -> "AbstractDeformer":
         """Make one from a case file's options, for a geometry; by default they are its fields."""
         arrays = {k: jnp.asarray(v) if isinstance(v, list) else v for k, v in options.items()}
         return cls(**arrays)
@@ -118,5 +118,3 @@ def map_slopes(deformer: AbstractDeformer, points: Points, controls: Vector) -> 
     _, push = jax.linearize(lambda p: deformer.follow(p, controls), jnp.asarray(points))
     columns = [push(jnp.zeros_like(points).at[:, i].set(1.0)) for i in range(3)]
     return jnp.stack(columns, axis=2)
-
-

@@ -86,7 +86,11 @@ class Motion(AbstractKernel):
 
     @override
     def plain(self, points: Array, controls: Array) -> tuple[Array, ...]:
-        return (jax.pure_callback(lambda *a: self.run(*map(np.asarray, a))[0], points, points, controls),)
+        return (
+            jax.pure_callback(
+                lambda *a: self.run(*map(np.asarray, a))[0], points, points, controls
+            ),
+        )
 
     @override
     def pushforward(self, arrays: Arrays, tangents: Arrays) -> tuple[Array, ...]:
@@ -134,7 +138,9 @@ class Pull(AbstractKernel):
     @override
     def plain(self, points, controls, vectors) -> tuple[Array, ...]:  # type: ignore
         given = points, controls, vectors
-        return jax.pure_callback(lambda *a: self.run(*map(np.asarray, a)), (points, controls), *given)
+        return jax.pure_callback(
+            lambda *a: self.run(*map(np.asarray, a)), (points, controls), *given
+        )
 
     @override
     def transpose(self, cotangents: Arrays, arrays: Arrays) -> tuple[Array | None, ...]:

@@ -1,7 +1,7 @@
 """A lattice: free-form deformation by a box of control points."""
 
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import equinox as eqx
 import jax
@@ -29,7 +29,7 @@ class Lattice(AbstractDeformer):
 
     A point moves by the sum of the control points' displacements, each with its tensor-product
     spline weight at the point. Controls are displacements in space [m], in the order of an array
-    of shape (nu, nv, nw, 3). The lattice's own axes are called x, y and z; they run along its edges.
+    of shape (nu, nv, nw, 3). The lattice's own axes x, y and z run along its edges.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Lattice(AbstractDeformer):
             raise ParameterError(f"the edges of a lattice must span a box, got {self.edges}")
 
     @classmethod
-    def box(cls, low: Any, high: Any, shape: Sequence[int], **options: Any) -> Self:
+    def box(cls, low: Any, high: Any, shape: Sequence[int], **options: Any) -> "Lattice":
         """A lattice along the axes of space from one corner to the opposite one [m]."""
         extent = np.asarray(high, float) - np.asarray(low, float)
         flat = (extent <= 0) & (np.asarray(shape) > 1)
@@ -132,7 +132,7 @@ class Lattice(AbstractDeformer):
         margin: float | Sequence[float] = 0.02,
         component: str | None = None,
         **options: Any,
-    ) -> Self:
+    ) -> "Lattice":
         """The box along the axes of space that encloses a geometry, or one component of it.
 
         `margin` is what it is larger by at each side, as a fraction of the extent; three numbers
@@ -164,7 +164,7 @@ class Lattice(AbstractDeformer):
         degree: int | tuple[int, int, int] = 3,
         knots: tuple[tuple[float, ...] | None, ...] = (None, None, None),
         freeze: tuple[Side, ...] = (),
-    ) -> Self:
+    ) -> "Lattice":
         """From a case file: by low and high, by origin and edges, else around the geometry."""
         rest: dict[str, Any] = {
             "ends": ends, "outside": outside, "basis": basis,
@@ -218,7 +218,8 @@ class Lattice(AbstractDeformer):
         table = jnp.einsum("iau,jbv,kcw,uvwd->ijkdabc", *powers, moves, optimize="optimal")
         table = table.reshape(-1, *table.shape[3:])
         u = (jnp.asarray(points) - self.origin) @ self.inverse
-        cells, local = zip(*(_located(axis, u[:, i]) for i, axis in enumerate(self.axes)))
+        found = [_located(axis, u[:, i]) for i, axis in enumerate(self.axes)]
+        cells, local = zip(*found, strict=True)
         lengths = [len(axis.starts) for axis in self.axes]
         row = (cells[0] * lengths[1] + cells[1]) * lengths[2] + cells[2]
         return _polynomial(table[row], *local)

@@ -19,7 +19,7 @@ _UNIFORM_CUBIC = np.array([[1, 4, 1, 0], [-3, 0, 3, 0], [3, -6, 3, 0], [-1, 3, -
 
 
 class Axis(NamedTuple):
-    """Weights of `count` control points along one axis, whose box runs from 0 to 1.
+    """Weights of the control points along one axis, whose box runs from 0 to 1.
 
     Cell c begins at `starts[c]`; the first begins at minus infinity. In it the weight of control
     point k is the sum over a of `powers[c, a, k] * t**a`, t = (u - offsets[c]) * scales[c].
@@ -32,7 +32,7 @@ class Axis(NamedTuple):
     powers: Float[np.ndarray, "cells terms count"]
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Control points."""
         return self.powers.shape[2]
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bspline import Axis
 from . import cellwise_loops as loops
+from .bspline import Axis
 from .kernel import empty
 from .threads import spread
 
@@ -31,7 +31,7 @@ def coefficients(axes: Axes, moves: np.ndarray) -> np.ndarray:
     """Polynomial coefficients (cells, 3, P, Q, R) from control displacements (nu, nv, nw, 3)."""
     table = moves
     for i, axis in enumerate(axes):
-        table = _along(axis.powers.reshape(-1, axis.count), table, i)
+        table = _along(axis.powers.reshape(-1, axis.size), table, i)
     split = [size for axis in axes for size in axis.powers.shape[:2]]
     table = table.reshape(*split, 3).transpose(0, 2, 4, 6, 1, 3, 5)
     return np.ascontiguousarray(table).reshape(-1, *table.shape[3:])
@@ -43,7 +43,7 @@ def gathered(axes: Axes, moments: np.ndarray) -> np.ndarray:
     table = moments.reshape(*split, *moments.shape[1:]).transpose(0, 4, 1, 5, 2, 6, 3)
     table = table.reshape(*(axis.powers[..., 0].size for axis in axes), 3)
     for i, axis in enumerate(axes):
-        table = _along(axis.powers.reshape(-1, axis.count).T, table, i)
+        table = _along(axis.powers.reshape(-1, axis.size).T, table, i)
     return table
 
 
@@ -72,7 +72,7 @@ class Blocks(NamedTuple):
     z: np.ndarray
     order: np.ndarray
     cells: np.ndarray
-    count: int
+    length: int
 
 
 def blocks(axes: Axes, u: np.ndarray) -> Blocks:
@@ -88,13 +88,16 @@ def blocks(axes: Axes, u: np.ndarray) -> Blocks:
     rows = int(needed.sum())
     sorted_order = np.full(rows * size, -1, np.int32)
     sorted_order[place] = order
-    local = []
-    for _, t in found:
-        row = np.zeros(rows * size)
-        row[place] = t[order]
-        local.append(row.reshape(rows, size))
+    local = np.zeros((3, rows * size))
+    for i, (_, t) in enumerate(found):
+        local[i, place] = t[order]
     return Blocks(
-        *local, sorted_order.reshape(rows, size), np.repeat(used, needed).astype(np.int32), len(u)
+        x=local[0].reshape(rows, size),
+        y=local[1].reshape(rows, size),
+        z=local[2].reshape(rows, size),
+        order=sorted_order.reshape(rows, size),
+        cells=np.repeat(used, needed).astype(np.int32),
+        length=len(u),
     )
 
 
@@ -106,7 +109,7 @@ def _block_size(points: int, cells: int) -> int:
 
 def displaced(b: Blocks, table: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
     """Displacements of the blocks' points in their own order, added to `rest` where given."""
-    out = empty((b.count, 3))
+    out = empty((b.length, 3))
     base = np.empty((0, 3)) if rest is None else rest
     least = THREAD_WORTH // b.x.shape[1]
     spread(loops.forward, len(b.cells), _terms(table), *b[:5], table, base, out, least=least)

@@ -1,7 +1,7 @@
 """The compiled loops of `cellwise`; what is compiled is kept on disk.
 
 The first argument of most is `terms`, one tuple per axis with as many entries as a polynomial has
-coefficients: the length of a tuple is part of its type, so each size gets loops of its own, unrolled.
+coefficients: the length of a tuple is part of its type, so each size gets its own loops.
 """
 
 import numba
@@ -19,7 +19,7 @@ _reordering = numba.njit(
 
 
 @_compiled
-def product(matrix, table):  # type: ignore
+def product(matrix, table):
     """A mostly empty matrix times a table."""
     rows, inner = matrix.shape
     result = np.zeros((rows, table.shape[1]))
@@ -33,7 +33,7 @@ def product(matrix, table):  # type: ignore
 
 
 @_compiled
-def forward(terms, x, y, z, order, cells, table, rest, out, part, start, stop):  # type: ignore
+def forward(terms, x, y, z, order, cells, table, rest, out, part, start, stop):
     """A component that no control moves costs nothing."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     size = x.shape[1]
@@ -72,7 +72,7 @@ def forward(terms, x, y, z, order, cells, table, rest, out, part, start, stop): 
 
 
 @_reordering
-def _gather(terms, local, vectors, first, end, left, right, total):  # type: ignore
+def _gather(terms, local, vectors, first, end, left, right, total):
     """Moments of vectors over a run of points in one cell."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     for p in range(first, end):
@@ -112,7 +112,7 @@ def _gather(terms, local, vectors, first, end, left, right, total):  # type: ign
 
 
 @_compiled
-def moments(terms, x, y, z, order, cells, vectors, count, part, start, stop):  # type: ignore
+def moments(terms, x, y, z, order, cells, vectors, count, part, start, stop):
     """Moments of vectors, cell by cell."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     size = x.shape[1]
@@ -130,7 +130,7 @@ def moments(terms, x, y, z, order, cells, vectors, count, part, start, stop):  #
 
 
 @_compiled
-def _cell(u, starts):  # type: ignore
+def _cell(u, starts):
     """Last cell that begins at or before u: a guess from even spacing, then steps."""
     last = len(starts) - 1
     if last == 0:
@@ -149,7 +149,7 @@ def _cell(u, starts):  # type: ignore
 
 
 @_compiled
-def _place(points, start, stop, origin, inverse, starts, offsets, scales, cell, local, scale):  # type: ignore
+def _place(points, start, stop, origin, inverse, starts, offsets, scales, cell, local, scale):
     """Cell, local coordinates and their scales of the points start .. stop."""
     for p in range(stop - start):
         x = points[start + p, 0] - origin[0]
@@ -165,7 +165,7 @@ def _place(points, start, stop, origin, inverse, starts, offsets, scales, cell, 
 
 
 @_compiled
-def _run_end(cell, first, count):  # type: ignore
+def _run_end(cell, first, count):
     """Where the run of points in one cell that begins at `first` ends."""
     end = first + 1
     while end < count and cell[end] == cell[first]:
@@ -174,7 +174,7 @@ def _run_end(cell, first, count):  # type: ignore
 
 
 @_compiled
-def _field(terms, c, local, first, end, out):  # type: ignore
+def _field(terms, c, local, first, end, out):
     """Its values along a run of points."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     for p in range(first, end):
@@ -191,7 +191,7 @@ def _field(terms, c, local, first, end, out):  # type: ignore
 
 
 @_compiled
-def _slopes(terms, c, local, first, end, out):  # type: ignore
+def _slopes(terms, c, local, first, end, out):
     """Its three local slopes along a run of points."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     for p in range(first, end):
@@ -215,7 +215,7 @@ def _slopes(terms, c, local, first, end, out):  # type: ignore
 
 
 @_compiled
-def follow(terms, origin, inverse, starts, offsets, scales, table, points, out, part, start, stop):  # type: ignore
+def follow(terms, origin, inverse, starts, offsets, scales, table, points, out, part, start, stop):
     """Value at each point."""
     cell = np.empty(STRETCH, np.int64)
     work = np.empty((3, 3, STRETCH))
@@ -239,7 +239,7 @@ def follow(terms, origin, inverse, starts, offsets, scales, table, points, out, 
 
 @_compiled
 def push(terms, origin, inverse, starts, offsets, scales, table, change, points, motion, out,
-    part, start, stop,):  # type: ignore  # fmt: skip
+    part, start, stop,):  # fmt: skip
     """Forward derivative at each point."""
     cell = np.empty(STRETCH, np.int64)
     work = np.empty((4, 3, STRETCH))
@@ -276,7 +276,7 @@ def push(terms, origin, inverse, starts, offsets, scales, table, change, points,
 @_reordering
 def pull(
     terms, origin, inverse, starts, offsets, scales, table, points, vectors, out, part, start, stop
-):  # type: ignore
+):
     """Reverse derivative at each point."""
     P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
     sums = np.zeros(table.shape)

@@ -19,7 +19,6 @@ from jax.interpreters import ad, batching, mlir
 
 from .._types import Array
 
-
 Arrays = Sequence[Any]
 
 

@@ -4,7 +4,7 @@ A lattice's axes are named x, y, z along its own edges. All displacements are in
 is a row of control points across an axis; those that the lattice freezes get no number.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -48,16 +48,12 @@ def group(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
     return Link(each(lattice, axis, **where).matrix.sum(axis=1, keepdims=True))
 
 
-def camber(
-    lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName
-) -> Link:
+def camber(lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName) -> Link:
     """At each station along one axis (or two), all controls move together along another."""
     return _stations(lattice, along, axis, np.ones(lattice.shape[AXES[axis]]))
 
 
-def thickness(
-    lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName
-) -> Link:
+def thickness(lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName) -> Link:
     """At each station, the two sides move apart: the number is the growth of the box there.
 
     Upper controls move by half of it, lower ones by minus half, rows between in proportion.
@@ -168,7 +164,7 @@ def _check_numbers(numbers: Sequence[int], count: int, what: str) -> None:
         raise ParameterError(f"{what} run from 0 to {count - 1}, got {bad[0]}")
 
 
-LINKS = {
+LINKS: dict[str, Callable[..., Link]] = {
     "controls": controls,
     "each": each,
     "group": group,

@@ -111,9 +111,7 @@ def variable(
         typical = span / 10 if 0 < span < math.inf else 1.0
     if not 0 < typical < math.inf:
         raise ParameterError(f"variable {name!r}: typical must be above 0, got {typical}")
-    return Variable(
-        name, _floats(values), _floats(lower), _floats(upper), float(typical), unit
-    )
+    return Variable(name, _floats(values), _floats(lower), _floats(upper), float(typical), unit)
 
 
 def _floats(array: np.ndarray) -> tuple[float, ...]:

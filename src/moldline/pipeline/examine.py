@@ -6,9 +6,11 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
+from .._types import Array
 from ..deformers.base import map_slopes
 from ..deformers.foreign import AbstractNumpyDeformer
 from ..deformers.lattice import Lattice
+from ..mesh import Surface
 from ..mesh.joined import joined_points
 from ..numerics.taylor import Remainder, remainder
 from .pipeline import Pipeline, Values
@@ -58,9 +60,9 @@ class Tear:
     def __str__(self) -> str:
         x, y, z = self.place
         return (
-            f"stage {self.stage!r} tears the mesh: {self.edges} edges leave its box where it moves, "
-            f"by up to {self.widest:.3g} near ({x:.4g}, {y:.4g}, {z:.4g}); freeze that side, "
-            f"enlarge the box or let outside = \"extend\""
+            f"stage {self.stage!r} tears the mesh: {self.edges} edges leave its box where it "
+            f"moves, by up to {self.widest:.3g} near ({x:.4g}, {y:.4g}, {z:.4g}); freeze that "
+            f'side, enlarge the box or let outside = "extend"'
         )
 
 
@@ -89,11 +91,12 @@ class Proof:
 
 
 def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
-    """Search a deformation for folds; a sampled answer, which small folds between samples escape."""
+    """Search a deformation for folds, at samples; a small fold between them is not seen."""
     points = np.asarray(pipeline.geometry.points)
     boxes = [_samples(stage.deformer) for stage in pipeline.own_stages]
     places = np.concatenate([points, *boxes])
-    slopes, present = np.broadcast_to(np.eye(3), (len(places), 3, 3)), jnp.asarray(places)
+    slopes: np.ndarray = np.broadcast_to(np.eye(3), (len(places), 3, 3))
+    present: Array = jnp.asarray(places)
     full = pipeline.values(values)
     for stage in pipeline.own_stages:
         controls = stage.controls(full)
@@ -115,7 +118,7 @@ def _samples(deformer: Any) -> np.ndarray:
         return np.empty((0, 3))
     most = int(MOST_SAMPLES ** (1 / 3))
     lines = [
-        np.linspace(0, 1, min(most, SAMPLES * (len(axis.starts) - 2) + 1)) if axis.count > 1
+        np.linspace(0, 1, min(most, SAMPLES * (len(axis.starts) - 2) + 1)) if axis.size > 1
         else np.array([0.5])
         for axis in deformer.axes
     ]  # fmt: skip
@@ -151,8 +154,11 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
         name: jnp.asarray(variable.typical * rng.uniform(-1, 1, variable.size))
         for name, variable in pipeline.variables.items()
     }
-    foreign = [s for s in pipeline.own_stages if isinstance(s.deformer, AbstractNumpyDeformer)]
-    methods = {s.deformer.method(pipeline.geometry.points, s.controls(full)) for s in foreign}
+    methods = {
+        stage.deformer.method(pipeline.geometry.points, stage.controls(full))
+        for stage in pipeline.own_stages
+        if isinstance(stage.deformer, AbstractNumpyDeformer)
+    }
     accuracy = 1e-7 if "central differences" in methods else 0.0
     weights = rng.normal(size=pipeline.geometry.points.shape)
     pushed = float(np.vdot(weights, np.asarray(pipeline.pushforward(full, along))))
@@ -166,14 +172,17 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
     )
 
 
-def _place(point: np.ndarray) -> tuple[float, float, float]:
+def _place(point: Array) -> tuple[float, float, float]:
     return float(point[0]), float(point[1]), float(point[2])
 
 
 def turned_faces(pipeline: Pipeline, values: Values | None = None) -> np.ndarray:
     """Faces of a surface whose normals the deformation turns by more than 90 degrees."""
+    if not isinstance(pipeline.geometry, Surface):
+        return np.empty(0, int)
+    faces = np.asarray(pipeline.geometry.faces)
     before, after = (
-        _normals(np.asarray(points), np.asarray(pipeline.geometry.faces))
+        _normals(np.asarray(points), faces)
         for points in (pipeline.geometry.points, pipeline.points(values))
     )
     return np.flatnonzero(np.einsum("ij,ij->i", before, after) < 0)

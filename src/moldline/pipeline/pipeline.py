@@ -137,7 +137,7 @@ class Pipeline(eqx.Module):
         """
         base = on or self.result.split("/")[0]
         _check_name(base, self.geometries)
-        rider = points if hasattr(points, "moved") else Cloud(points)
+        rider = Cloud(points) if isinstance(points, jax.Array | np.ndarray) else points
         key = f"{base}/{name}"
         return Pipeline({base: self.geometries[base], key: rider}, self._on(base), key)
 

@@ -26,7 +26,8 @@ def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -
     if isinstance(geometry, Section):
         draw_section(axes, geometry.points)
     elif isinstance(geometry, Cloud):
-        axes.scatter(*View.of(view).project(geometry.points)[:, :2].T, s=2)
+        projected = View.of(view).project(geometry.points)
+        axes.scatter(projected[:, 0], projected[:, 1], s=2)
         axes.set_aspect("equal")
     elif isinstance(geometry, VolumeMesh):
         flat = "top" if geometry.dimension == 2 else view
@@ -45,8 +46,7 @@ def of_deformation(
     if isinstance(pipeline.geometry, Section):
         figure = blank(12, 5)
         axes = figure.subplots()
-        for grid in grids or [None]:
-            draw_section(axes, rest, moved, grid)
+        draw_section(axes, rest, moved, grids)
         axes.set_title(title)
         return figure
     faces = _faces(pipeline)
@@ -104,15 +104,16 @@ def _highlighted(
     pipeline: Pipeline, direction: dict[str, np.ndarray]
 ) -> list[tuple[int, np.ndarray]]:
     """Of each lattice the control points that a number moves."""
-    lattices = [s for s in pipeline.own_stages if isinstance(s.deformer, Lattice)]
-    found = []
-    for i, stage in enumerate(lattices):
+    found: list[tuple[int, np.ndarray]] = []
+    for stage in pipeline.own_stages:
+        if not isinstance(stage.deformer, Lattice):
+            continue
         moves = np.zeros(stage.deformer.size)
         for variable, link in stage.links.items():
             if variable.name in direction:
                 moves = moves + np.asarray(link.matrix) @ direction[variable.name]
         free = np.asarray(stage.deformer.moves(moves))
-        found.append((i, np.argwhere(np.any(free != 0, axis=-1))))
+        found.append((len(found), np.argwhere(np.any(free != 0, axis=-1))))
     return found
 
 

@@ -34,21 +34,21 @@ def draw_section(
     axes: Axes,
     points: Any,
     moved: Any = None,
-    lattice: tuple[Any, Any] | None = None,
+    lattices: Sequence[tuple[Any, Any]] = (),
     plane: str = "xy",
 ) -> None:
-    """Draw a curve: at rest dashed, deformed solid, the lattice's moved control points red."""
+    """Draw a curve: at rest dashed, deformed solid, the lattices' moved control points red."""
     i, j = ("xyz".index(name) for name in plane)
     points = np.asarray(points)
     axes.plot(points[:, i], points[:, j], "--" if moved is not None else "-", color=GREY, lw=1.2)
     if moved is not None:
         moved = np.asarray(moved)
         axes.plot(moved[:, i], moved[:, j], color="black", lw=1.4)
-    if lattice is not None:
+    for lattice in lattices:
         rest, new = (np.asarray(grid)[..., [i, j]] for grid in lattice)
         axes.add_collection(LineCollection(grid_lines(rest), colors=GREY, linewidths=0.5))
         axes.add_collection(LineCollection(grid_lines(new), colors=RED, linewidths=0.6))
-        axes.scatter(*new.reshape(-1, 2).T, s=16, color=RED, zorder=3)
+        axes.scatter(new[..., 0], new[..., 1], s=16, color=RED, zorder=3)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(f"{plane[0]}")
     axes.set_ylabel(f"{plane[1]}")
@@ -63,7 +63,7 @@ def section_picture(
     i, j = (k for k in range(3) if k != "xyz".index(axis))
     for panel, at in zip(rows, stations, strict=True):
         for shape, style, colour in ((points, "--", GREY), (moved, "-", "black")):
-            lines = cut(shape, faces, axis, at)[:, :, [i, j]]
+            lines = list(cut(shape, faces, axis, at)[:, :, [i, j]])
             panel.add_collection(
                 LineCollection(lines, colors=colour, linestyles=style, linewidths=1.2),
             )

@@ -88,7 +88,13 @@ def draw_lattice(
     if len(highlighted):
         chosen = np.ravel_multi_index(tuple(np.transpose(highlighted)), np.shape(rest)[:3])
         axes.scatter(
-            *last[chosen, :2].T, s=70, facecolor="#ffdd33", edgecolor="black", zorder=5, lw=0.8
+            last[chosen, 0],
+            last[chosen, 1],
+            s=70,
+            facecolor="#ffdd33",
+            edgecolor="black",
+            zorder=5,
+            lw=0.8,
         )
     _tidy(axes)
 
@@ -192,5 +198,3 @@ def _tidy(axes: Axes) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.autoscale_view()
     axes.set_axis_off()
-
-

@@ -1,7 +1,7 @@
 """Where a picture is looked at from."""
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +34,7 @@ class View:
     elevation_deg: float
 
     @classmethod
-    def of(cls, view: "View | str") -> Self:
+    def of(cls, view: "View | str") -> "View":
         """A view by its name, or the view given."""
         if isinstance(view, cls):
             return view

@@ -12,11 +12,11 @@ import numpy as np
 from ..._types import Array
 from ...errors import FileError
 from .. import Geometry, Surface
-from . import METRES, write as write_geometry
+from . import METRES, write
 from .files import replacing
 
 
-def write(
+def write_sensitivities(
     path: Path | str, geometry: Geometry, columns: Mapping[str, Array], units: str | None = None
 ) -> None:
     """Write a geometry and, for each label, the derivative of its points, shape (n, 3).
@@ -41,7 +41,7 @@ def write(
             {**geometry.point_data, **scaled},
             geometry.face_data,
         )
-        write_geometry(path, full, units=units)
+        write(path, full, units=units)
     else:
         raise FileError(
             f"{path}: sensitivities of a {type(geometry).__name__} go to .npz"

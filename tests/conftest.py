@@ -4,7 +4,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import moldline as ml
 
 
 @pytest.fixture
@@ -19,3 +22,23 @@ def data() -> Callable[[str], Path]:
         return folder / name
 
     return find
+
+
+@pytest.fixture(scope="session")
+def ball():
+    """A closed unit sphere of triangles, 642 points."""
+    corners = np.vstack([np.eye(3), -np.eye(3)])
+    faces = np.array(
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    )
+    for _ in range(4):
+        pairs = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+        unique, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        middle = inverse.reshape(-1, 3) + len(corners)
+        corners = np.vstack([corners, corners[unique].sum(axis=1)])
+        corners /= np.linalg.norm(corners, axis=1, keepdims=True)
+        a, b, c = faces.T
+        ab, bc, ca = middle.T
+        quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+        faces = np.concatenate([np.stack(q, axis=1) for q in quarters])
+    return ml.Surface(corners, faces)

@@ -59,12 +59,37 @@ def _is_array(annotation: Any) -> bool:
     )
 
 
-def problems(error: ValidationError, where: str) -> list[str]:
-    """One sentence for each thing that a model found wrong, naming key, value and expectation."""
-    found = []
+def problems(error: ValidationError, where: str, given: Any) -> list[str]:
+    """One sentence for each key that a model found wrong: what was expected, and what it holds."""
+    expected: dict[tuple[str | int, ...], list[str]] = {}
+    held: dict[tuple[str | int, ...], str] = {}
     for problem in error.errors():
-        key = ".".join(map(str, (where, *problem["loc"]) if where else problem["loc"]))
-        value = problem.get("input")
-        said = "" if problem["type"] in ("missing", "extra_forbidden") else f", got {value!r}"
-        found.append(f"{key}: {problem['msg'].lower()}{said}")
-    return found
+        key, value = _found(given, problem["loc"])
+        if problem["type"] == "missing" and isinstance(problem["loc"][-1], str):
+            key, said = problem["loc"], "it must be there"
+        elif problem["type"] == "missing":
+            said = "too few entries"
+        elif problem["type"] == "extra_forbidden":
+            said = "there is no such key"
+        else:
+            said = problem["msg"].lower()
+        expected.setdefault(key, []).append(said)
+        held[key] = "" if problem["type"] == "missing" and key == problem["loc"] else repr(value)
+    return [
+        ".".join(map(str, filter(lambda part: part != "", (where, *key))))
+        + f": {' or '.join(dict.fromkeys(said))}"
+        + (f", got {held[key]}" if held[key] else "")
+        for key, said in expected.items()
+    ]
+
+
+def _found(given: Any, place: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]:
+    """The part of a place that the given tables really have (models add names of types)."""
+    key: list[str | int] = []
+    for part in place:
+        try:
+            given = given[part]
+        except (KeyError, IndexError, TypeError):
+            break
+        key.append(part)
+    return tuple(key), given

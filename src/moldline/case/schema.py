@@ -7,7 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import registry
-from ..errors import CaseError, ParameterError
+from ..errors import CaseError
 from ..parameters.links import LINKS
 from ..parameters.variable import UNITS
 from . import options
@@ -103,7 +103,7 @@ def parse(text: str, file: str) -> CaseTable:
     try:
         return CaseTable.model_validate(tables)
     except ValidationError as error:
-        raise CaseError(_listed(file, options.problems(error, ""))) from None
+        raise CaseError(_listed(file, options.problems(error, "", tables))) from None
 
 
 def checked(model: type[BaseModel], given: dict[str, Any], file: str, where: str) -> dict[str, Any]:
@@ -111,7 +111,7 @@ def checked(model: type[BaseModel], given: dict[str, Any], file: str, where: str
     try:
         instance = model.model_validate(given)
     except ValidationError as error:
-        raise CaseError(_listed(file, options.problems(error, where))) from None
+        raise CaseError(_listed(file, options.problems(error, where, given))) from None
     return {name: getattr(instance, name) for name in instance.model_fields_set}
 
 
@@ -164,6 +164,3 @@ def text_of(path: Path) -> str:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise CaseError(f"{path}: not a text file: byte {error.start} is not UTF-8") from None
-
-
-__all__ = ["CaseTable", "ParameterError", "checked", "json_schema", "parse", "text_of"]

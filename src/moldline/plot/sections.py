@@ -7,27 +7,31 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from ..errors import ParameterError
 from .figure import blank
-from .surfaces import GREY, RED, grid_lines
+from .surfaces import DARK, GREY, RED, grid_lines
+
+DASHES = (0, (5, 3))
 
 
-def cut(points: Any, faces: Any, axis: str, at: float) -> np.ndarray:
-    """Where a plane x, y or z = `at` cuts a triangulation: segments, shape (s, 2, 3)."""
+def cut(points: Any, faces: Any, axis: str, at: float) -> list[np.ndarray]:
+    """The polylines, each (p, 3), in which a plane x, y or z = `at` cuts a triangulation.
+
+    A closed one ends with its first point. Points that lie in the plane count as below it.
+    """
     points, faces = np.asarray(points, float), np.asarray(faces)
-    height = points[:, "xyz".index(axis)] - at
+    height = points[:, _number(axis)] - at
     above = height[faces] > 0
     crossed = faces[above.any(axis=1) & ~above.all(axis=1)]
-    ends = []
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        a, b = crossed[:, i], crossed[:, j]
-        differs = (height[a] > 0) != (height[b] > 0)
-        share = height[a] / np.where(differs, height[a] - height[b], 1.0)
-        place = points[a] + share[:, None] * (points[b] - points[a])
-        ends.append(np.where(differs[:, None], place, np.nan))
-    stacked = np.stack(ends, axis=1)
-    met = ~np.isnan(stacked[:, :, 0])
-    return stacked[met].reshape(-1, 2, 3)
+    sides = np.sort(np.stack([crossed, np.roll(crossed, -1, axis=1)], axis=-1), axis=-1)
+    splits = (height[sides] > 0).sum(axis=-1) == 1  # two sides of each crossed face
+    ends, pairs = np.unique(sides[splits], axis=0, return_inverse=True)
+    low, high = ends.T
+    share = height[low] / np.where(low != high, height[low] - height[high], 1.0)
+    places = points[low] + share[:, None] * (points[high] - points[low])
+    return [places[chain] for chain in _chains(pairs.reshape(-1, 2))]
 
 
 def draw_section(
@@ -38,36 +42,90 @@ def draw_section(
     plane: str = "xy",
 ) -> None:
     """Draw a curve: at rest dashed, deformed solid, the lattices' moved control points red."""
-    i, j = ("xyz".index(name) for name in plane)
+    i, j = (_number(name) for name in plane)
     points = np.asarray(points)
-    axes.plot(points[:, i], points[:, j], "--" if moved is not None else "-", color=GREY, lw=1.2)
-    if moved is not None:
+    if moved is None:
+        axes.plot(points[:, i], points[:, j], color=DARK, lw=1.5)
+    else:
         moved = np.asarray(moved)
-        axes.plot(moved[:, i], moved[:, j], color="black", lw=1.4)
+        axes.plot(points[:, i], points[:, j], ls=DASHES, color=GREY, lw=1.2, label="initial")
+        axes.plot(moved[:, i], moved[:, j], color=DARK, lw=1.6, label="deformed")
     for lattice in lattices:
         rest, new = (np.asarray(grid)[..., [i, j]] for grid in lattice)
-        axes.add_collection(LineCollection(grid_lines(rest), colors=GREY, linewidths=0.5))
-        axes.add_collection(LineCollection(grid_lines(new), colors=RED, linewidths=0.6))
-        axes.scatter(new[..., 0], new[..., 1], s=16, color=RED, zorder=3)
+        axes.add_collection(
+            LineCollection(grid_lines(rest), colors=GREY, linewidths=0.5, linestyles=DASHES)
+        )
+        axes.add_collection(LineCollection(grid_lines(new), colors=RED, linewidths=0.7))
+        axes.scatter(new[..., 0], new[..., 1], s=20, color=RED, zorder=3)
+    axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel(f"{plane[0]}")
-    axes.set_ylabel(f"{plane[1]}")
+    axes.set_xlabel(plane[0])
+    axes.set_ylabel(plane[1])
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def section_picture(
     points: Any, moved: Any, faces: Any, stations: Sequence[float], axis: str = "y"
 ) -> Figure:
     """Cuts of a surface at several stations, before (dashed) and after."""
-    figure = blank(11, 2.1 * len(stations) + 0.6)
+    styles = [(points, DASHES, GREY, 1.2, "before"), (moved, "-", DARK, 1.5, "after")]
+    figure = blank(10.0, 2.0 * len(stations) + 0.6)
     rows = np.atleast_1d(figure.subplots(len(stations), 1))
-    i, j = (k for k in range(3) if k != "xyz".index(axis))
+    i, j = (k for k in range(3) if k != _number(axis))
     for panel, at in zip(rows, stations, strict=True):
-        for shape, style, colour in ((points, "--", GREY), (moved, "-", "black")):
-            lines = list(cut(shape, faces, axis, at)[:, :, [i, j]])
+        for shape, style, colour, width, _ in styles:
+            lines = [line[:, [i, j]] for line in _section(shape, faces, axis, at)]
             panel.add_collection(
-                LineCollection(lines, colors=colour, linestyles=style, linewidths=1.2),
+                LineCollection(lines, colors=colour, linestyles=style, linewidths=width)
             )
         panel.autoscale_view()
         panel.set_aspect("equal", adjustable="datalim")
-        panel.set_title(f"{axis} = {at:g}", fontsize=10, loc="left")
+        panel.set_title(f"{axis} = {at:g}", fontsize=11, loc="left")
+        panel.set_ylabel("xyz"[j])
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.tick_params(labelsize=9, color=GREY)
+    rows[-1].set_xlabel("xyz"[i])
+    handles = [Line2D([], [], ls=s, color=c, lw=w, label=name) for _, s, c, w, name in styles]
+    rows[0].legend(handles=handles, loc="upper right", frameon=False, fontsize=10)
     return figure
+
+
+def _section(points: Any, faces: Any, axis: str, at: float) -> list[np.ndarray]:
+    lines = cut(points, faces, axis, at)
+    if not lines:
+        along = np.asarray(points)[:, _number(axis)]
+        raise ParameterError(
+            f"there is no section at {axis} = {at:g}; the surface reaches from "
+            f"{along.min():g} to {along.max():g}"
+        )
+    return lines
+
+
+def _number(axis: str) -> int:
+    if axis not in ("x", "y", "z"):
+        raise ParameterError(f"an axis is x, y or z, got {axis!r}")
+    return "xyz".index(axis)
+
+
+def _chains(pairs: np.ndarray) -> list[list[int]]:
+    """Chains of numbers that cover all pairs, each pair once; a closed one repeats its first."""
+    near: dict[int, list[int]] = {}
+    for number, pair in enumerate(pairs.tolist()):
+        for end in pair:
+            near.setdefault(end, []).append(number)
+    unused = set(range(len(pairs)))
+
+    def onward(here: int) -> list[int]:
+        chain = []
+        while (number := next((n for n in near[here] if n in unused), None)) is not None:
+            unused.remove(number)
+            here = int(pairs[number].sum()) - here
+            chain.append(here)
+        return chain
+
+    chains = []
+    loose = [end for end, touching in near.items() if len(touching) == 1]
+    for start in [*loose, *near]:  # open chains from one of their ends, then closed ones
+        if any(number in unused for number in near[start]):
+            chains.append([start, *onward(start)])
+    return chains

@@ -7,17 +7,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import CenteredNorm, Normalize, to_rgb
+from matplotlib.colors import CenteredNorm, Normalize, to_rgb, to_rgba_array
 from matplotlib.figure import Figure
 
 from ..errors import ParameterError
+from ..mesh import topology
 from .figure import blank
 from .view import View
 
-METAL = "#b9c4d0"
+METAL = "#b4c2d2"
 RED = "#d62728"
 GREY = "#7a7a7a"
-LIGHT = np.array([0.25, 0.45, 0.86])
+DARK = "#22282f"
+LIGHT = np.array([-0.48, 0.62, 0.62])
 """Direction of the light in the picture: right, up, towards the eye."""
 
 LatticePoints = Any
@@ -33,31 +35,33 @@ def draw_surface(
     label: str = "",
     colours: str = "RdBu_r",
     is_signed: bool = True,
-    alpha: float = 1.0,
-    plain: str = METAL,
 ) -> ScalarMappable | None:
     """Draw shaded triangles, far ones first; with `values`, per point or per face, coloured.
 
-    Signed values are coloured symmetrically about zero. Gives what a colour bar shows.
+    Signed values are coloured symmetrically about zero. Gives what a colour bar shows. Of a closed
+    surface only the triangles that face the eye are drawn.
     """
     projected, faces = View.of(view).project(points), np.asarray(faces)
-    corners = projected[faces]
-    order = np.argsort(corners[:, :, 2].sum(axis=1), kind="stable")
-    base, scale = _base_colours(values, len(projected), faces, colours, is_signed, plain)
-    shaded = base * _brightness(corners)[:, None]
+    base, scale = _base_colours(values, len(projected), faces, colours, is_signed)
+    normals = _normals(projected, faces)
+    seen = np.flatnonzero(_faces_eye(projected, faces, normals))
+    seen = seen[np.argsort(projected[faces[seen], 2].sum(axis=1), kind="stable")]
+    contrast = 1.0 if values is None else 0.4  # or colours would be hard to compare
+    shade = 1 - contrast * (1 - _brightness(normals[seen]))
     polygons = PolyCollection(
-        corners[order][:, :, :2],
-        facecolors=np.clip(shaded[order], 0, 1),
+        projected[faces[seen], :2],
+        facecolors=np.clip(base[seen] * shade[:, None], 0, 1),
         edgecolors="face",  # closes the seams that antialiasing leaves between triangles
-        linewidths=0.25,
-        alpha=alpha,
+        linewidths=0.5,
         rasterized=True,
     )
     axes.add_collection(polygons, autolim=False)
     axes.update_datalim(projected[:, :2])
     _tidy(axes)
     if scale is not None and label:
-        axes.figure.colorbar(scale, ax=axes, label=label, shrink=0.6, pad=0.02)
+        bar = axes.figure.colorbar(scale, ax=axes, shrink=0.7, aspect=28, pad=0.02)
+        bar.set_label(label, fontsize=12)
+        bar.outline.set_visible(False)
     return scale
 
 
@@ -68,33 +72,25 @@ def draw_lattice(
     highlighted: Any = (),
     view: View | str = "iso",
 ) -> None:
-    """Draw a lattice: at rest thin and grey, moved in black with red control points.
+    """Draw a lattice: at rest thin, grey and dashed, moved dark with red control points.
 
-    `highlighted` are indices (i, j, k) of control points drawn larger.
+    `highlighted` are indices (i, j, k) of control points drawn larger. What is farther from the
+    eye is paler.
     """
-    shown = View.of(view)
-    both = [(rest, GREY, 0.5, "--")]
-    if moved is not None:
-        both.append((moved, "black", 0.7, "-"))
-    for grid, colour, width, style in both:
-        flat = shown.project(np.asarray(grid).reshape(-1, 3)).reshape(np.shape(grid))
-        lines = LineCollection(
-            grid_lines(flat[..., :2]), colors=colour, linewidths=width, linestyles=style, zorder=3
-        )
-        axes.add_collection(lines, autolim=False)
-        axes.update_datalim(flat[..., :2].reshape(-1, 2))
-    last = shown.project(np.asarray(both[-1][0]).reshape(-1, 3))
-    axes.scatter(last[:, 0], last[:, 1], s=11, color=RED, zorder=4, linewidths=0)
+    shown, rest = View.of(view), np.asarray(rest, float)
+    flat = shown.project(rest.reshape(-1, 3)).reshape(rest.shape)
+    if moved is None:
+        _draw_lines(axes, flat, DARK, 0.5, "-")
+    else:
+        _draw_lines(axes, flat, GREY, 0.5, (0, (4, 3)))
+        flat = shown.project(np.asarray(moved, float).reshape(-1, 3)).reshape(rest.shape)
+        _draw_lines(axes, flat, DARK, 0.8, "-")
+    right, up, depth = flat.reshape(-1, 3).T
+    axes.scatter(right, up, s=13, color=_faded(RED, depth), zorder=4, linewidths=0)
     if len(highlighted):
-        chosen = np.ravel_multi_index(tuple(np.transpose(highlighted)), np.shape(rest)[:3])
+        chosen = np.ravel_multi_index(tuple(np.transpose(highlighted)), rest.shape[:3])
         axes.scatter(
-            last[chosen, 0],
-            last[chosen, 1],
-            s=70,
-            facecolor="#ffdd33",
-            edgecolor="black",
-            zorder=5,
-            lw=0.8,
+            right[chosen], up[chosen], s=80, color="#ffd43b", edgecolors=DARK, lw=0.9, zorder=5
         )
     _tidy(axes)
 
@@ -117,18 +113,19 @@ def before_and_after(
     title: str = "",
 ) -> Figure:
     """A picture of a surface at rest with its lattices, and deformed with them moved."""
-    figure = blank(14, 6.5)
+    shapes = [points, moved, *(grid for lattice in lattices for grid in lattice)]
+    low, high = _frame(shapes, view)
+    figure = _fitted(14.0, 7.0, low, high)
     left, right = figure.subplots(1, 2)
     draw_surface(left, points, faces, view=view)
     draw_surface(right, moved, faces, view=view)
     for rest, new in lattices:
         draw_lattice(left, rest, view=view)
         draw_lattice(right, rest, new, view=view)
-    for axes in (left, right):  # both at one scale
-        axes.update_datalim(np.concatenate([left.dataLim.get_points(), right.dataLim.get_points()]))
+    for axes, name in ((left, "before"), (right, "after")):
+        axes.update_datalim([low, high])  # both at one scale and place
         axes.autoscale_view()
-    left.set_title("before")
-    right.set_title("after")
+        axes.set_title(name, fontsize=12)
     figure.suptitle(title, fontsize=15)
     return figure
 
@@ -148,20 +145,53 @@ def sensitivity_map(
     `highlighted` pairs the number of a lattice with the control points in it that the colours
     belong to.
     """
-    figure = blank(12, 7)
+    figure = _fitted(11.0, 9.8, *_frame([points, *lattices], view))
     axes = figure.subplots()
     draw_surface(axes, points, faces, values, view, label)
     for number, rest in enumerate(lattices):
         draw_lattice(axes, rest, highlighted=dict(highlighted).get(number, ()), view=view)
-    axes.set_title(title, fontsize=14)
+    axes.set_title(title, fontsize=15)
     return figure
 
 
+def grid_lines(grid: np.ndarray) -> list[np.ndarray]:
+    """The polylines of a grid of control points along its three axes."""
+    lines = []
+    for axis in range(3):
+        if grid.shape[axis] > 1:
+            lines += list(np.moveaxis(grid, axis, 2).reshape(-1, grid.shape[axis], grid.shape[3]))
+    return lines
+
+
+def _draw_lines(axes: Axes, flat: np.ndarray, colour: str, width: float, style: Any) -> None:
+    """Draw a projected grid of control points."""
+    lines = grid_lines(flat)
+    colours = _faded(colour, np.array([line[:, 2].mean() for line in lines]))
+    drawn = LineCollection(
+        [line[:, :2] for line in lines],
+        colors=colours,
+        linewidths=width,
+        linestyles=style,
+        zorder=3,
+    )
+    axes.add_collection(drawn, autolim=False)
+    axes.update_datalim(flat[..., :2].reshape(-1, 2))
+
+
+def _faded(colour: str, depth: np.ndarray) -> np.ndarray:
+    """A colour for each depth, paler for the farther ones."""
+    nearness = (depth - depth.min()) / (np.ptp(depth) or 1.0)
+    faded = np.repeat(to_rgba_array(colour), len(depth), axis=0)
+    faded[:, 3] = 0.45 + 0.55 * nearness
+    return faded
+
+
 def _base_colours(
-    values: Any, count: int, faces: np.ndarray, colours: str, is_signed: bool, plain: str
+    values: Any, count: int, faces: np.ndarray, colours: str, is_signed: bool
 ) -> tuple[np.ndarray, ScalarMappable | None]:
+    """Each face's colour before shading, and the scale of the values."""
     if values is None:
-        return np.broadcast_to(to_rgb(plain), (len(faces), 3)), None
+        return np.broadcast_to(to_rgb(METAL), (len(faces), 3)), None
     values = np.asarray(values, float)
     if values.shape not in ((count,), (len(faces),)):
         raise ParameterError(
@@ -176,22 +206,46 @@ def _base_colours(
     return scale.to_rgba(per_face)[:, :3], scale
 
 
-def _brightness(corners: np.ndarray) -> np.ndarray:
-    """Lambert's law from both sides, with some light from everywhere."""
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1)
-    facing = np.where(normals[:, 2] < 0, -1.0, 1.0)
-    slant = facing * (normals @ LIGHT) / np.where(lengths > 0, lengths, 1.0)
-    return 0.55 + 0.47 * np.clip(slant, 0, 1)
+def _normals(projected: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals of the faces in the picture's axes; 0 where a face has no area."""
+    a, b, c = (projected[faces[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals / np.where(lengths > 0, lengths, 1.0)
 
 
-def grid_lines(grid: np.ndarray) -> list[np.ndarray]:
-    """The polylines of a grid of control points along its three axes."""
-    lines = []
-    for axis in range(3):
-        if grid.shape[axis] > 1:
-            lines += list(np.moveaxis(grid, axis, 2).reshape(-1, grid.shape[axis], 2))
-    return lines
+def _faces_eye(projected: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Which faces can be seen: of a closed surface those that look at the eye, else all.
+
+    Sorting by depth lets the far side of a thin edge show through; leaving it out does not.
+    """
+    edges = topology.edges(faces)
+    if len(edges.ends) == 0 or np.any(edges.uses != 2) or np.any(edges.forward != 1):
+        return np.ones(len(faces), bool)
+    middle = projected.mean(axis=0)
+    a, b, c = (projected[faces[:, i]] - middle for i in range(3))
+    outward = np.sign(np.einsum("ij,ij->", a, np.cross(b, c)))  # of the enclosed volume
+    return outward * normals[:, 2] > 0
+
+
+def _brightness(normals: np.ndarray) -> np.ndarray:
+    """Lambert's law on both sides, wrapped around so that no side is black."""
+    towards = np.where(normals[:, 2:] < 0, -normals, normals)
+    slant = towards @ (LIGHT / np.linalg.norm(LIGHT))
+    return 0.38 + 0.7 * (0.5 + 0.5 * slant) ** 1.5
+
+
+def _frame(shapes: Sequence[Any], view: View | str) -> tuple[np.ndarray, np.ndarray]:
+    """Lower left and upper right corner of everything, projected."""
+    flat = np.concatenate([np.reshape(shape, (-1, 3)) for shape in shapes])
+    flat = View.of(view).project(flat)[:, :2]
+    return flat.min(axis=0), flat.max(axis=0)
+
+
+def _fitted(width: float, panel: float, low: np.ndarray, high: np.ndarray) -> Figure:
+    """An empty figure with panels of a given width [in] and the proportions of what they show."""
+    across, up = high - low
+    return blank(width, float(np.clip(panel * up / (across or 1.0), 2.5, 10.0)) + 0.7)
 
 
 def _tidy(axes: Axes) -> None:

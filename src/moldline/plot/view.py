@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import ParameterError
 
 NAMED = {
-    "iso": (-125.0, 35.0),
+    "iso": (-155.0, 32.0),
     "top": (-90.0, 90.0),
     "bottom": (-90.0, -90.0),
     "front": (180.0, 0.0),

@@ -1,12 +1,13 @@
 """Pictures: what is drawn, not how it looks."""
 
+import struct
+
 import numpy as np
 import pytest
-from matplotlib.collections import PolyCollection
 
 import moldline as ml
 from moldline.errors import FileError, ParameterError
-from moldline.plot import View, cut, draw_surface
+from moldline.plot import View
 from moldline.plot.figure import blank
 
 
@@ -16,33 +17,9 @@ def test_views_look_along_their_axes():
     np.testing.assert_allclose(View.of("iso").axes @ View.of("iso").axes.T, np.eye(3), atol=1e-12)
 
 
-def test_near_triangles_are_drawn_last():
-    points = np.array([[0, 0, z] for z in (0, 5, 2)], float).repeat(3, 0)
-    points += np.tile([[0, 0, 0], [1, 0, 0], [0, 1, 0]], (3, 1))
-    axes = blank().subplots()
-    draw_surface(axes, points, np.arange(9).reshape(3, 3), [1.0, 2.0, 3.0], "top", is_signed=False)
-    polygons = next(c for c in axes.collections if isinstance(c, PolyCollection))
-    order = [0, 2, 1]  # by height
-    colours = polygons.get_facecolor()
-    assert len(colours) == 3
-    plain = blank().subplots()
-    for rank, face in enumerate(order):
-        draw_surface(
-            plain, points, np.arange(9).reshape(3, 3)[[face]], [face + 1.0], "top", is_signed=False
-        )
-        assert colours[rank][3] == 1.0
-
-
-def test_values_of_a_wrong_length_are_refused(ball):
-    with pytest.raises(ParameterError, match="values are one per point"):
-        draw_surface(blank().subplots(), ball.points, ball.faces, np.zeros(3))
-
-
-def test_a_cut_through_a_ball_is_its_circle(ball):
-    segments = cut(ball.points, ball.faces, "z", 0.1)
-    radius = np.linalg.norm(segments[..., :2], axis=-1)
-    np.testing.assert_allclose(radius, np.sqrt(1 - 0.01), atol=0.02)  # the ball is a polyhedron
-    np.testing.assert_allclose(segments[..., 2], 0.1, atol=1e-12)
+def test_a_view_of_an_unknown_name_is_refused():
+    with pytest.raises(ParameterError, match="no view named 'left'; there is: iso, top"):
+        View.of("left")
 
 
 def test_pictures_of_every_kind_of_geometry_are_made(ball, tmp_path):
@@ -61,6 +38,26 @@ def test_a_section_is_drawn_before_and_after(tmp_path):
     case = ml.Pipeline(section, [ml.Stage(box, {t: ml.links.thickness(box, "x", "y")})])
     figure = ml.plot.of_deformation(case, {"t": [0.0, 0.1, 0.1, 0.0]})
     assert len(figure.axes[0].lines) == 2
+
+
+def test_a_saved_picture_has_the_size_asked_for(tmp_path):
+    ml.plot.save(blank(4.0, 3.0), tmp_path / "x.png", dpi=50)
+    header = (tmp_path / "x.png").read_bytes()[:24]
+    assert header[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", header[16:]) == (200, 150)
+    assert [path.name for path in tmp_path.iterdir()] == ["x.png"]
+
+
+def test_pictures_are_also_written_as_drawings(ball, tmp_path):
+    figure = ml.plot.of_geometry(ball)
+    for name, start in (("x.svg", b"<?xml"), ("x.pdf", b"%PDF")):
+        ml.plot.save(figure, tmp_path / name, dpi=40)
+        assert (tmp_path / name).read_bytes().startswith(start)
+
+
+def test_a_picture_that_cannot_be_written_says_why(tmp_path):
+    with pytest.raises(FileError, match="cannot be written: No such file"):
+        ml.plot.save(blank(), tmp_path / "missing" / "x.png")
 
 
 def test_a_picture_of_an_unknown_kind_is_refused(tmp_path):

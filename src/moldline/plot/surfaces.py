@@ -46,10 +46,12 @@ def draw_surface(
     normals = _normals(projected, faces)
     seen = np.flatnonzero(_faces_eye(projected, faces, normals))
     seen = seen[np.argsort(projected[faces[seen], 2].sum(axis=1), kind="stable")]
-    contrast = 1.0 if values is None else 0.4  # or colours would be hard to compare
-    shade = 1 - contrast * (1 - _brightness(normals[seen]))
+    shade = _brightness(normals[seen])
+    if values is not None:
+        shade = 0.55 + 0.4 * shade  # strong shading would hide the colours, none the shape
+    corners: Any = projected[faces[seen], :2]  # matplotlib's annotation knows no arrays
     polygons = PolyCollection(
-        projected[faces[seen], :2],
+        corners,
         facecolors=np.clip(base[seen] * shade[:, None], 0, 1),
         edgecolors="face",  # closes the seams that antialiasing leaves between triangles
         linewidths=0.5,

@@ -1,13 +1,15 @@
 """Pictures: what is drawn, not how it looks."""
 
 import struct
+import sys
 
 import numpy as np
 import pytest
 
 import moldline as ml
 from moldline.errors import FileError, ParameterError
-from moldline.plot import View
+from moldline.mesh.volume import Cells
+from moldline.plot import View, window
 from moldline.plot.figure import blank
 
 
@@ -66,11 +68,27 @@ def test_a_picture_of_an_unknown_kind_is_refused(tmp_path):
 
 
 def test_a_window_without_pyvista_or_display_says_what_to_do(ball, monkeypatch):
-    from moldline.plot import window
-
     monkeypatch.setattr(window, "TRIAL", "raise SystemExit(139)")
     with pytest.raises(ml.errors.MoldlineError, match="write a picture with -o FILE instead"):
         window.show(ball)
     monkeypatch.setattr(window, "TRIAL", "import no_such_module")
     with pytest.raises(ml.errors.MoldlineError, match="pip install"):
         window.show(ball)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="only X11 can lack a display")
+def test_a_window_without_a_display_says_what_to_do(ball, monkeypatch):
+    monkeypatch.setattr(window, "TRIAL", "")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(ml.errors.MoldlineError, match="write a picture with -o FILE instead"):
+        window.show(ball)
+
+
+def test_of_a_solid_mesh_the_lines_of_its_boundary_are_drawn():
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    tetra = Cells(np.array([10]), np.array([0, 4]), np.arange(4))
+    base = Cells(np.array([5]), np.array([0, 3]), np.arange(3))
+    whole = ml.plot.of_geometry(ml.VolumeMesh(points, tetra))
+    skin = ml.plot.of_geometry(ml.VolumeMesh(points, tetra, {"base": base}))
+    assert len(whole.axes[0].collections[0].get_segments()) == 6
+    assert len(skin.axes[0].collections[0].get_segments()) == 3

@@ -35,7 +35,7 @@ def test_near_triangles_are_drawn_last():
     points, faces = stacked(0.0, 5.0, 2.0)
     values, order = np.array([1.0, 2.0, 3.0]), [0, 2, 1]
     axes = blank().subplots()
-    scale = draw_surface(axes, points, faces, values, "top", is_signed=False)
+    scale = draw_surface(axes, points, faces, values, "top", colours="viridis", is_signed=False)
     shade = axes.collections[0].get_facecolor()[:, :3] / scale.to_rgba(values[order])[:, :3]
     np.testing.assert_allclose(shade, shade[0, 0])  # level triangles are equally bright
 

@@ -113,7 +113,7 @@ def load(path: str | os.PathLike[str]) -> Case:
     return Case(place, tables, pipeline, riders)
 
 
-def _read(case: Path, table: schema.GeometryTable, where: str) -> Geometry:
+def _read(case: Path, table: schema.GeometryTable | schema.RiderTable, where: str) -> Geometry:
     try:
         return read(case.parent / table.file, units=table.units)
     except MoldlineError as error:

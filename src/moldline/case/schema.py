@@ -33,9 +33,11 @@ class GeometryTable(Table):
     units: LengthUnit | None = Field(None, description="the file's unit; then metres inside")
 
 
-class RiderTable(GeometryTable):
+class RiderTable(Table):
     """Other points that move as a geometry does: a flow mesh, a structural model."""
 
+    file: str = Field(description="path, relative to the case file")
+    units: LengthUnit | None = Field(None, description="the file's unit; then metres inside")
     on: str = Field("", description="the geometry that they ride on")
 
 

@@ -60,8 +60,8 @@ class Lattice(AbstractDeformer):
     axes: tuple[bspline.Axis, bspline.Axis, bspline.Axis]
     frozen: np.ndarray
     shape: Triple = eqx.field(static=True)
-    ends: bspline.Ends = eqx.field(static=True)
-    outside: bspline.Outside = eqx.field(static=True)
+    ends: str = eqx.field(static=True)
+    outside: str = eqx.field(static=True)
     following: Following = eqx.field(static=True)
 
     def __init__(
@@ -70,21 +70,18 @@ class Lattice(AbstractDeformer):
         edges: Any,
         shape: Sequence[int],
         *,
-        ends: bspline.Ends = "clamped",
-        outside: bspline.Outside = "keep",
-        basis: Basis = "b-spline",
+        ends: str = "clamped",
+        outside: str = "keep",
+        basis: str = "b-spline",
         degree: int | Sequence[int] = 3,
         knots: Sequence[Sequence[float] | None] = (None, None, None),
-        freeze: Sequence[Side] = (),
+        freeze: Sequence[str] = (),
     ):
         _check_choice("ends", ends, bspline.Ends)
         _check_choice("outside", outside, bspline.Outside)
         _check_choice("basis", basis, Basis)
-        if len(shape) != 3 or any(n != int(n) or n < 1 for n in shape):
-            raise ParameterError(f"a lattice has three counts of at least 1, got {tuple(shape)}")
-        self.origin = np.asarray(origin, float)
-        self.edges = np.asarray(edges, float)
-        self.shape = (int(shape[0]), int(shape[1]), int(shape[2]))
+        self.shape = _counts(shape)
+        self.origin, self.edges = _spanning(origin, edges)
         self.ends, self.outside = ends, outside
         degrees = (degree,) * 3 if isinstance(degree, int) else tuple(degree)
         if basis == "bernstein":
@@ -102,21 +99,11 @@ class Lattice(AbstractDeformer):
         self.frozen = _frozen(self.shape, self.axes, ends, tuple(freeze))
         self.following = Following(self)
 
-    def __check_init__(self) -> None:
-        if self.origin.shape != (3,) or self.edges.shape != (3, 3):
-            raise ParameterError(
-                f"a box needs an origin (3,) and edges (3, 3), "
-                f"got {self.origin.shape} and {self.edges.shape}"
-            )
-        volume = np.linalg.det(self.edges / np.linalg.norm(self.edges, axis=1, keepdims=True))
-        if not np.isfinite(volume) or abs(volume) < 1e-9:
-            raise ParameterError(f"the edges of a lattice must span a box, got {self.edges}")
-
     @classmethod
     def box(cls, low: Any, high: Any, shape: Sequence[int], **options: Any) -> "Lattice":
         """A lattice along the axes of space from one corner to the opposite one [m]."""
         extent = np.asarray(high, float) - np.asarray(low, float)
-        flat = (extent <= 0) & (np.asarray(shape) > 1)
+        flat = (extent <= 0) & (np.array(_counts(shape)) > 1)
         if np.any(flat):
             raise GeometryError(
                 f"a lattice from {list(map(float, low))} to {list(map(float, high))} is flat "
@@ -290,7 +277,7 @@ def _polynomial(c: Array, x: Array, y: Array, z: Array) -> Array:
 
 
 def _frozen(
-    shape: Triple, axes: tuple[bspline.Axis, ...], ends: str, sides: tuple[Side, ...]
+    shape: Triple, axes: tuple[bspline.Axis, ...], ends: str, sides: tuple[str, ...]
 ) -> np.ndarray:
     """The rows next to each named side whose rest makes the motion fade smoothly to nothing."""
     frozen = np.zeros(shape, bool)
@@ -308,6 +295,27 @@ def _frozen(
     if frozen.all():
         raise ParameterError(f"freezing {', '.join(sides)} leaves no free control point in {shape}")
     return frozen
+
+
+def _counts(shape: Sequence[int]) -> Triple:
+    if len(shape) != 3 or any(n != int(n) or n < 1 for n in shape):
+        raise ParameterError(f"a lattice has three counts of at least 1, got {tuple(shape)}")
+    return int(shape[0]), int(shape[1]), int(shape[2])
+
+
+def _spanning(origin: Any, edges: Any) -> tuple[np.ndarray, np.ndarray]:
+    """A box's corner and edges, refused where they span none."""
+    origin, edges = np.asarray(origin, float), np.asarray(edges, float)
+    if origin.shape != (3,) or edges.shape != (3, 3):
+        raise ParameterError(
+            f"a box needs an origin (3,) and edges (3, 3), got {origin.shape} and {edges.shape}"
+        )
+    lengths = np.linalg.norm(edges, axis=1, keepdims=True)
+    if not np.isfinite(origin).all() or not np.isfinite(lengths).all():
+        raise ParameterError(f"origin and edges must be finite, got {origin} and {edges}")
+    if np.any(lengths == 0) or abs(np.linalg.det(edges / lengths)) < 1e-9:
+        raise ParameterError(f"the edges of a lattice must span a box, got {edges.tolist()}")
+    return origin, edges
 
 
 def _check_choice(name: str, value: str, choices: Any) -> None:

@@ -43,7 +43,7 @@ class Axis(NamedTuple):
 
 
 def clamped(
-    count: int, degree: int, outside: Outside, interior: tuple[float, ...] | None = None
+    count: int, degree: int, outside: str, interior: tuple[float, ...] | None = None
 ) -> Axis:
     """B-spline with clamped ends; control points rest at the Greville positions.
 
@@ -79,7 +79,7 @@ def clamped(
     return _enclosed(rest, breaks, offsets, powers, outside)
 
 
-def even(count: int, outside: Outside) -> Axis:
+def even(count: int, outside: str) -> Axis:
     """Blender's rule: evenly spaced control points, neighbours beyond an end are the end's.
 
     Source: Blender's lattice modifier with B-spline interpolation; the formula was checked
@@ -107,7 +107,7 @@ def _enclosed(
     breaks: np.ndarray,
     offsets: np.ndarray,
     powers: np.ndarray,
-    outside: Outside,
+    outside: str,
 ) -> Axis:
     """Add the two cells beyond the ends: unmoved, or moved as the end control point is."""
     beyond = np.zeros((2, *powers.shape[1:]))

@@ -19,7 +19,7 @@ from .view import View
 
 
 def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -> Figure:
-    """A geometry as it is."""
+    """A geometry as it is; of a volume mesh in three dimensions the boundary's lines."""
     figure = blank()
     axes = figure.subplots()
     axes.set_title(title, fontsize=13)
@@ -31,7 +31,7 @@ def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -
         axes.set_aspect("equal")
     elif isinstance(geometry, VolumeMesh):
         flat = "top" if geometry.dimension == 2 else view
-        draw_edges(axes, geometry.points, joined_points(geometry), flat)
+        draw_edges(axes, geometry.points, _mesh_lines(geometry), flat)
     else:
         draw_surface(axes, geometry.points, geometry.faces, view=view)
     return figure
@@ -89,6 +89,14 @@ def of_cuts(pipeline: Pipeline, values: Values | None, stations: Sequence[float]
     """Sections at several y, before (dashed) and after."""
     rest, moved = pipeline.geometry.points, np.asarray(pipeline.points(values))
     return section_picture(rest, moved, _faces(pipeline), stations)
+
+
+def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
+    """Pairs of joined points: all of a plane mesh, only the boundary's where it would be hidden."""
+    if mesh.dimension == 2 or not mesh.markers:
+        return joined_points(mesh)
+    skins = [VolumeMesh(mesh.points, cells) for cells in mesh.markers.values()]
+    return np.concatenate([joined_points(skin) for skin in skins])
 
 
 def _lattices(pipeline: Pipeline, values: Values | None) -> list[tuple[Any, Any]]:

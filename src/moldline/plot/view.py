@@ -8,12 +8,13 @@ import numpy as np
 from ..errors import ParameterError
 
 NAMED = {
-    "iso": (-155.0, 32.0),
+    "iso": (155.0, 42.0),
     "top": (-90.0, 90.0),
     "bottom": (-90.0, -90.0),
     "front": (180.0, 0.0),
     "rear": (0.0, 0.0),
     "side": (-90.0, 0.0),
+    "iso-left": (-155.0, 32.0),
 }
 """Azimuth and elevation of the eye [deg], for x aft, y to starboard and z up."""
 

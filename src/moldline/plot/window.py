@@ -1,13 +1,17 @@
 """An interactive window, through PyVista (an optional extra)."""
 
+import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from ..errors import MoldlineError
 from ..mesh import Geometry
 from ..mesh.joined import joined_points
+from .surfaces import GREY, METAL, RED, grid_lines
 
 TRIAL = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(64, 64));"
@@ -15,8 +19,14 @@ TRIAL = (
 )
 
 
-def show(geometry: Geometry) -> None:
-    """Show a geometry until the window is closed."""
+def show(
+    geometry: Geometry, values: Any = None, label: str = "", lattices: Sequence[Any] = ()
+) -> None:
+    """Show a geometry until the window is closed.
+
+    `values`, per point or per face, colour it; `lattices` are arrays of control points (nu, nv,
+    nw, 3).
+    """
     _check()
     import pyvista
 
@@ -28,7 +38,19 @@ def show(geometry: Geometry) -> None:
         lines = np.insert(joined_points(geometry), 0, 2, axis=1).ravel()
         shape = pyvista.PolyData(points, lines=lines)
     plotter = pyvista.Plotter()
-    plotter.add_mesh(shape, color="#b9c4d0", show_edges=len(points) < 20_000)
+    colours: dict[str, Any] = {"color": METAL}
+    if values is not None:
+        largest = float(np.abs(values).max())
+        bar = {"title": label}
+        colours = {"scalars": np.asarray(values), "cmap": "RdBu_r", "scalar_bar_args": bar}
+        colours["clim"] = (-largest, largest)
+    plotter.add_mesh(shape, show_edges=len(points) < 2_000, **colours)
+    for grid in map(np.asarray, lattices):
+        for line in grid_lines(grid):
+            plotter.add_mesh(pyvista.lines_from_points(line), color=GREY)
+        plotter.add_points(
+            grid.reshape(-1, 3), color=RED, point_size=9, render_points_as_spheres=True
+        )
     plotter.add_axes()
     plotter.show()
 
@@ -36,11 +58,12 @@ def show(geometry: Geometry) -> None:
 def _check() -> None:
     """Ask a child process whether pictures work here: without OpenGL, VTK crashes the process."""
     trial = subprocess.run([sys.executable, "-c", TRIAL], capture_output=True, text=True)
-    if trial.returncode == 0:
-        return
     if "No module named" in trial.stderr:
         raise MoldlineError('a window needs PyVista: pip install "moldline[window]"')
-    raise MoldlineError(
-        "a window needs a display with OpenGL, and this machine has none (on Debian: "
-        "apt-get install libgl1 libxrender1); write a picture with -o FILE instead"
-    )
+    # without an X server VTK draws in memory, and a window would be over before it is seen
+    has_display = not sys.platform.startswith("linux") or bool(os.environ.get("DISPLAY"))
+    if trial.returncode != 0 or not has_display:
+        raise MoldlineError(
+            "a window needs a display with OpenGL, and this machine has none (on Debian: "
+            "apt-get install libgl1 libxrender1); write a picture with -o FILE instead"
+        )

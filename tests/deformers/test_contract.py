@@ -1,0 +1,123 @@
+"""Every deformer keeps the contract."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import moldline as ml
+from moldline import registry
+from moldline.deformers.contract import CLAUSES, check
+
+SHEARED = [[2.0, 0.0, 0.0], [1.0, 3.0, 0.2], [0.0, 0.3, 1.0]]
+
+LATTICES = {
+    "clamped": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (7, 4, 3)),
+    "flat": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (5, 1, 2)),
+    "line": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (1, 1, 5)),
+    "sheared": ml.Lattice((-1, -1, -0.5), SHEARED, (5, 4, 4), outside="extend"),
+    "blender": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (4, 3, 5), ends="blender"),
+    "blender-extend": ml.Lattice.box(
+        (-1, -1, -1), (1, 1, 1), (4, 3, 5), ends="blender", outside="extend"
+    ),
+    "bernstein": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (6, 3, 4), basis="bernstein"),
+    "quintic": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (8, 2, 7), degree=5),
+    "uneven": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (6, 2, 2), knots=([0.1, 0.6], None, None)),
+    "frozen": ml.Lattice.box((-1, -1, -1), (1, 1, 1), (7, 8, 2), freeze=("x+", "y-", "y+")),
+}
+
+
+class Swell(ml.AbstractDeformer):
+    """A plug-in in JAX: only a definition."""
+
+    @property
+    def size(self):
+        return 2
+
+    def __call__(self, points, controls):
+        return points * (1 + controls[0] * jnp.sin(points[:, :1])) + controls[1] ** 2 * points**2
+
+
+class Wave(ml.AbstractNumpyDeformer):
+    """A plug-in in NumPy that lets complex numbers through."""
+
+    @property
+    def size(self):
+        return 2
+
+    def move(self, points, controls):
+        moved = points + 0 * controls[0]
+        moved[:, 2] = points[:, 2] + controls[0] * np.sin(points[:, 0] + controls[1])
+        return moved
+
+
+class Fold(ml.AbstractNumpyDeformer):
+    """A plug-in in NumPy that does not."""
+
+    @property
+    def size(self):
+        return 1
+
+    def move(self, points, controls):
+        moved = np.array(points, float)
+        moved[:, 2] += controls[0] * np.sin(np.asarray(points[:, 0], float))
+        return moved
+
+
+OTHERS = {"swell": Swell(), "wave": Wave(), "fold": Fold()}
+
+
+@pytest.fixture(scope="module")
+def cloud():
+    """Inside and outside the boxes, and on their faces, edges and corners."""
+    rng = np.random.default_rng(0)
+    corners = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 3)
+    return np.concatenate([rng.uniform(-0.99, 0.99, (60, 3)), rng.uniform(-2, 2, (40, 3)), corners])
+
+
+@pytest.mark.parametrize("clause", CLAUSES, ids=lambda c: c.__name__)
+@pytest.mark.parametrize("name", LATTICES)
+def test_a_lattice_keeps_the_contract(name, clause, cloud):
+    lattice = LATTICES[name]
+    if "derivatives_by_points" in clause.__name__:
+        cloud = cloud[:60]  # "keep" jumps at the faces of the box
+    clause(lattice, cloud)
+
+
+@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
+@pytest.mark.parametrize("name", OTHERS)
+def test_a_plug_in_keeps_the_contract(name, cloud):
+    check(OTHERS[name], cloud[:60])
+
+
+def test_every_registered_deformer_is_tried():
+    assert set(registry.deformers()) >= {"lattice"}
+    assert registry.deformer("lattice") is ml.Lattice
+
+
+def test_a_numpy_plug_in_says_how_it_is_differentiated(cloud):
+    assert OTHERS["wave"].method(cloud, np.array([0.1, 0.2])) == "complex step"
+
+
+@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
+def test_a_numpy_plug_in_that_drops_imaginary_parts_falls_back(cloud):
+    assert OTHERS["fold"].method(cloud, np.array([0.1])) == "central differences"
+
+
+def test_the_contract_catches_a_wrong_deformer(cloud):
+    class Greedy(ml.AbstractDeformer):
+        """Looks at the other points."""
+
+        @property
+        def size(self):
+            return 1
+
+        def __call__(self, points, controls):
+            return points + controls[0] * points.mean(axis=0)
+
+    with pytest.raises(AssertionError, match="moves otherwise when it is alone"):
+        check(Greedy(), cloud)
+
+
+def test_an_unknown_deformer_is_told_with_what_there_is():
+    with pytest.raises(ml.errors.ParameterError, match="no deformers named 'lattce'; installed: "):
+        registry.deformer("lattce")

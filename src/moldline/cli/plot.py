@@ -18,7 +18,7 @@ def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
     values.configure(command)
     command.add_argument("-o", "--output", type=Path, help="picture: .png, .svg or .pdf")
-    command.add_argument("--view", default="iso", help="iso, top, bottom, front, rear or side")
+    command.add_argument("--view", default="iso", help="iso, iso-left, top, bottom, front, rear, side")
     command.add_argument(
         "--sensitivity", metavar="NUMBER", help="colour by the derivative, e.g. droop or droop[1]"
     )
@@ -61,12 +61,13 @@ def _picture(given: argparse.Namespace) -> Any:
 def _window(given: argparse.Namespace) -> int:
     from ..case import load
     from ..mesh.io import read
-    from ..plot import window
+    from ..plot import pictures, window
 
-    if given.case.suffix.lower() == ".toml":
-        case = load(given.case)
-        shape = case.pipeline(values.chosen(case, given))
-    else:
-        shape = read(given.case)
-    window.show(shape)
+    if given.case.suffix.lower() != ".toml":
+        window.show(read(given.case))
+        return 0
+    case = load(given.case)
+    chosen = values.chosen(case, given)
+    grids = [moved for _, moved in pictures.lattices(case.pipeline, chosen)]
+    window.show(case.pipeline(chosen), lattices=grids)
     return 0

@@ -42,7 +42,7 @@ def of_deformation(
 ) -> Figure:
     """A pipeline's geometry before and after, with its lattices."""
     rest, moved = pipeline.geometry.points, pipeline.points(values)
-    grids = _lattices(pipeline, values)
+    grids = lattices(pipeline, values)
     if isinstance(pipeline.geometry, Section):
         figure = blank(12, 5)
         axes = figure.subplots()
@@ -70,7 +70,7 @@ def of_sensitivity(
     direction = {name: np.eye(variable.size)[index]}
     motion = np.asarray(pipeline.pushforward(values, direction))
     axis = int(np.abs(motion).max(axis=0).argmax())
-    grids = _lattices(pipeline, values)
+    grids = lattices(pipeline, values)
     unit = f" per {variable.unit}" if variable.unit else ""
     label = f"d{'xyz'[axis]} / d {variable.labels()[index]}{unit and ' [m' + unit + ']'}"
     return sensitivity_map(
@@ -99,7 +99,8 @@ def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
     return np.concatenate([joined_points(skin) for skin in skins])
 
 
-def _lattices(pipeline: Pipeline, values: Values | None) -> list[tuple[Any, Any]]:
+def lattices(pipeline: Pipeline, values: Values | None = None) -> list[tuple[Any, Any]]:
+    """Control points of each lattice of a pipeline, at rest and moved, shape (nu, nv, nw, 3)."""
     full = pipeline.values(values)
     return [
         (stage.deformer.rest, np.asarray(stage.deformer.moved(stage.controls(full))))

@@ -78,7 +78,7 @@ def test_a_case_file_says_what_python_says(folder):
             'along = "q"',
             "stage.0.link.0.along: input should be 'x', 'y' or 'z'.*got 'q'",
         ),
-        ("size = 3", "size = 4", "must have the shape"),
+        ("size = 3", "size = 4", "takes 3 numbers, the variable has 4; make its size 3"),
         ("moldline = 1", "moldline = ", "not TOML: .*line 2"),
         ("size = 3", "size = 3\n[variable.idle]", "variable.idle: no stage has a link to it"),
     ],

@@ -79,6 +79,7 @@ def _deformation(
     torn = examine.tears(pipeline, chosen)
     proof = examine.proof(pipeline, chosen)
     turned = examine.turned_faces(pipeline, chosen)
+    inverted = examine.inverted_cells(pipeline, chosen)
     x, y, z = fold.place
     order = "linear, remainder at rounding" if proof.forward.is_linear else (
         f"order {proof.forward.order:.3f} of the Taylor remainder (2 is right)"
@@ -88,13 +89,15 @@ def _deformation(
         f"({x:.4g}, {y:.4g}, {z:.4g}), {fold.at_points:.4g} on the mesh; "
         f"{fold.samples} places looked at",
         f"  {'! space folds over' if fold.folds else 'space does not fold over there'}",
-        f"  {'! ' if len(turned) else ''}{len(turned)} faces turned by more than 90 degrees",
+        f"  {'! ' if len(turned) else ''}{len(turned)} faces turned by more than 90 degrees"
+        f"{f', ! {len(inverted)} cells turned inside out' if len(inverted) else ''}",
         *(f"  ! {tear}" for tear in torn),
         f"derivatives  {proof.method}: {order}; forward and reverse differ by {proof.mismatch:.1e}",
     ]
     report = {
         "folding": {**asdict(fold), "folds": fold.folds},
         "turned_faces": [int(face) for face in turned[:10]],
+        "inverted_cells": [int(cell) for cell in inverted[:10]],
         "tears": [asdict(tear) for tear in torn],
         "derivatives": {
             "method": proof.method,
@@ -106,4 +109,5 @@ def _deformation(
             "is_right": proof.is_right,
         },
     }
-    return report, lines, not fold.folds and not torn and not len(turned) and proof.is_right
+    is_sound = not (fold.folds or torn or len(turned) or len(inverted)) and proof.is_right
+    return report, lines, is_sound

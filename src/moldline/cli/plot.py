@@ -18,7 +18,9 @@ def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
     values.configure(command)
     command.add_argument("-o", "--output", type=Path, help="picture: .png, .svg or .pdf")
-    command.add_argument("--view", default="iso", help="iso, iso-left, top, bottom, front, rear, side")
+    command.add_argument(
+        "--view", default="iso", help="iso, iso-left, top, bottom, front, rear, side"
+    )
     command.add_argument(
         "--sensitivity", metavar="NUMBER", help="colour by the derivative, e.g. droop or droop[1]"
     )

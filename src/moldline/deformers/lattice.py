@@ -37,6 +37,8 @@ class Lattice(AbstractDeformer):
         The corner of the box where all three indices are zero.
     edges
         Rows are the three edges of the box from there: any directions that span a box.
+    inverse
+        Takes a place relative to the origin to box coordinates: (x - origin) @ inverse.
     shape
         Control points along each axis. With one, nothing depends on that axis.
     axes
@@ -57,6 +59,7 @@ class Lattice(AbstractDeformer):
 
     origin: Float[np.ndarray, "3"]
     edges: Float[np.ndarray, "3 3"]
+    inverse: Float[np.ndarray, "3 3"]
     axes: tuple[bspline.Axis, bspline.Axis, bspline.Axis]
     frozen: np.ndarray
     shape: Triple = eqx.field(static=True)
@@ -82,6 +85,7 @@ class Lattice(AbstractDeformer):
         _check_choice("basis", basis, Basis)
         self.shape = _counts(shape)
         self.origin, self.edges = _spanning(origin, edges)
+        self.inverse = np.linalg.inv(self.edges)
         self.ends, self.outside = ends, outside
         degrees = (degree,) * 3 if isinstance(degree, int) else tuple(degree)
         if basis == "bernstein":
@@ -182,18 +186,12 @@ class Lattice(AbstractDeformer):
 
     def moves(self, controls: Vector) -> Float[Array, "nu nv nw 3"]:
         """Displacements of the control points [m], zero for the frozen ones."""
-        moves = controls.reshape(*self.shape, 3)
-        return moves * ~self.frozen[..., None] if self.frozen.any() else moves
+        return controls.reshape(*self.shape, 3) * ~self.frozen[..., None]
 
     def direction(self, axis: str) -> Float[np.ndarray, "3"]:
         """Unit vector of one of the lattice's own axes."""
         edge = self.edges[AXES[axis]]
         return edge / np.linalg.norm(edge)
-
-    @property
-    def inverse(self) -> Float[np.ndarray, "3 3"]:
-        """Takes a place relative to the origin to box coordinates: (x - origin) @ inverse."""
-        return np.linalg.inv(self.edges)
 
     @override
     def __call__(self, points: Points, controls: Vector) -> Points:

@@ -10,7 +10,7 @@ from .._types import Array
 from ..deformers.base import map_slopes
 from ..deformers.foreign import AbstractNumpyDeformer
 from ..deformers.lattice import Lattice
-from ..mesh import Surface
+from ..mesh import Surface, VolumeMesh, quality
 from ..mesh.joined import joined_points
 from ..numerics.taylor import Remainder, remainder
 from .pipeline import Pipeline, Values
@@ -174,6 +174,14 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
 
 def _place(point: Array) -> tuple[float, float, float]:
     return float(point[0]), float(point[1]), float(point[2])
+
+
+def inverted_cells(pipeline: Pipeline, values: Values | None = None) -> np.ndarray:
+    """Cells of a volume mesh that the deformation turns inside out."""
+    if not isinstance(pipeline.geometry, VolumeMesh):
+        return np.empty(0, int)
+    after = quality.inverted_cells(pipeline.geometry.moved(pipeline.points(values)))
+    return np.setdiff1d(after, quality.inverted_cells(pipeline.geometry))
 
 
 def turned_faces(pipeline: Pipeline, values: Values | None = None) -> np.ndarray:

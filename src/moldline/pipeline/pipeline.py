@@ -101,6 +101,8 @@ class Pipeline(eqx.Module):
     def pushforward(self, values: Values | None, directions: Values) -> Points:
         """Derivative of the points along a change of the values, shape (n, 3)."""
         full = self.values(values)
+        for name in directions:
+            _check_name(name, full)
         change = {name: self._direction(name, directions.get(name)) for name in full}
         return self._push(full, change)
 
@@ -167,8 +169,9 @@ class Pipeline(eqx.Module):
         return any(stage.settles for stage in self._on(self.result))
 
     def _direction(self, name: str, direction: Any) -> Array:
-        size = self.variables[name].size
-        return jnp.zeros(size) if direction is None else jnp.asarray(direction, float).reshape(size)
+        variable = self.variables[name]
+        given = jnp.zeros(variable.size) if direction is None else jnp.asarray(direction, float)
+        return jnp.asarray(variable.checked(given))
 
 
 def _placed(stages: Sequence[Stage], bases: list[str]) -> Iterable[Stage]:

@@ -47,12 +47,17 @@ class Stage(eqx.Module):
 
     def __check_init__(self) -> None:
         for variable, link in self.links.items():
-            needed = (self.deformer.size, variable.size)
-            if link.matrix.shape != needed:
+            rows = link.matrix.shape[0]
+            if rows != self.deformer.size:
                 raise ParameterError(
-                    f"stage {self.name!r}: the link of variable {variable.name!r} "
-                    f"({variable.size} numbers) to {self.deformer.size} controls must have the "
-                    f"shape {needed}, got {link.matrix.shape}"
+                    f"stage {self.name!r}: the link of variable {variable.name!r} is for {rows} "
+                    f"controls, the deformer has {self.deformer.size}; was it made for another?"
+                )
+            if link.size != variable.size:
+                raise ParameterError(
+                    f"stage {self.name!r}: the link of variable {variable.name!r} takes "
+                    f"{link.size} numbers, the variable has {variable.size}; make its size "
+                    f"{link.size}"
                 )
 
     @property

@@ -14,7 +14,7 @@ from ..mesh.joined import joined_points
 from ..pipeline.pipeline import Pipeline, Values
 from .figure import blank
 from .sections import draw_section, section_picture
-from .surfaces import before_and_after, draw_edges, draw_surface, sensitivity_map
+from .surfaces import before_and_after, draw_edges, draw_lattice, draw_surface, sensitivity_map
 from .view import View
 
 
@@ -40,7 +40,7 @@ def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -
 def of_deformation(
     pipeline: Pipeline, values: Values | None = None, view: View | str = "iso", title: str = ""
 ) -> Figure:
-    """A pipeline's geometry before and after, with its lattices."""
+    """A pipeline's geometry before and after, with its lattices; of meshes and clouds the after."""
     rest, moved = pipeline.geometry.points, pipeline.points(values)
     grids = lattices(pipeline, values)
     if isinstance(pipeline.geometry, Section):
@@ -49,8 +49,9 @@ def of_deformation(
         draw_section(axes, rest, moved, grids)
         axes.set_title(title)
         return figure
-    faces = _faces(pipeline)
-    return before_and_after(rest, moved, faces, grids, view, title)
+    if not hasattr(pipeline.geometry, "faces"):
+        return _among_points(pipeline(values), grids, view, title)
+    return before_and_after(rest, moved, _faces(pipeline), grids, view, title)
 
 
 def of_sensitivity(
@@ -124,6 +125,22 @@ def _highlighted(
         free = np.asarray(stage.deformer.moves(moves))
         found.append((len(found), np.argwhere(np.any(free != 0, axis=-1))))
     return found
+
+
+def _among_points(geometry: Geometry, grids: list[Any], view: View | str, title: str) -> Figure:
+    """A mesh or a cloud with lattices in it, of which it may reach far beyond."""
+    figure = of_geometry(geometry, view, title)
+    (axes,) = figure.axes
+    shown = View.of("top" if getattr(geometry, "dimension", 3) == 2 else view)
+    for grid in grids:
+        draw_lattice(axes, *grid, view=shown)
+    if grids:
+        corners = np.concatenate([np.reshape(grid, (-1, 3)) for pair in grids for grid in pair])
+        low, high = (f(shown.project(corners)[:, :2], axis=0) for f in (np.min, np.max))
+        room = 0.15 * (high - low).max()
+        axes.set_xlim(low[0] - room, high[0] + room)
+        axes.set_ylim(low[1] - room, high[1] + room)
+    return figure
 
 
 def _numbered(pipeline: Pipeline, number: str) -> tuple[str, int]:

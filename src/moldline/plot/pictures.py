@@ -133,11 +133,12 @@ def _among_points(geometry: Geometry, grids: list[Any], view: View | str, title:
     (axes,) = figure.axes
     shown = View.of("top" if getattr(geometry, "dimension", 3) == 2 else view)
     for grid in grids:
-        draw_lattice(axes, *grid, view=shown)
+        draw_lattice(axes, grid[0], grid[1], view=shown)
     if grids:
         corners = np.concatenate([np.reshape(grid, (-1, 3)) for pair in grids for grid in pair])
         low, high = (f(shown.project(corners)[:, :2], axis=0) for f in (np.min, np.max))
         room = 0.15 * (high - low).max()
+        axes.set_aspect("equal", adjustable="box")
         axes.set_xlim(low[0] - room, high[0] + room)
         axes.set_ylim(low[1] - room, high[1] + room)
     return figure

@@ -44,7 +44,7 @@ bench: .venv/ready  ## the benchmark table
 	@$(BIN)/python benchmarks/deform.py
 
 docs: .venv/ready-dev  ## the documentation, into site/
-	@$(BIN)/mkdocs build --strict --quiet
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 blender:  ## an environment with Blender as a module, for comparison
 	@bash tools/blender_env.sh

@@ -29,4 +29,4 @@ def test_every_case_file_in_the_docs_is_valid():
             schema.parse(block, page.name)
             tomllib.loads(block)
             found += 1
-    assert found >= 2
+    assert found >= 1

@@ -37,7 +37,9 @@ def installed(tmp_path_factory):
     (folder / "sine_bumps.py").write_text((PLUGIN / "src/sine_bumps.py").read_text())
     about = folder / "moldline_sine_bumps-1.0.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 1.0\n")
+    (about / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: 1.0\n"
+    )
     rows = project["entry-points"]["moldline.deformers"].items()
     lines = "".join(f"{name} = {place}\n" for name, place in rows)
     (about / "entry_points.txt").write_text(f"[moldline.deformers]\n{lines}")
@@ -94,5 +96,7 @@ def test_the_plug_in_keeps_the_contract(installed):
         "x = np.random.default_rng(0).uniform(0.1, 0.9, (40, 3));"
         "check(SineBumps(crests=np.array([0.3, 0.6])), x); check(Shear(), x)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=installed)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=installed
+    )
     assert done.returncode == 0, done.stderr

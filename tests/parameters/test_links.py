@@ -89,6 +89,26 @@ def test_a_lattice_that_is_not_symmetric_cannot_be_mirrored():
         links.mirrored(lattice, links.camber(lattice, "x", "z"), "y")
 
 
+@pytest.mark.parametrize(
+    ("low", "count", "options"),
+    [
+        (0.0, 4, {"ends": "blender"}),  # the second row moves points at the end too
+        (0.0, 1, {}),  # the one row moves all points alike
+        (0.3, 4, {"outside": "extend"}),  # the first row moves what is beyond the end
+    ],
+)
+def test_a_lattice_that_would_move_the_plane_cannot_be_mirrored(low, count, options):
+    lattice = ml.Lattice.box((-1, low, -1), (1, 1, 1), (3, count, 3), **options)
+    with pytest.raises(ParameterError, match="moves points at y = 0 off that plane, by "):
+        links.mirrored(lattice, links.controls(lattice), "y")
+
+
+def test_a_lattice_beside_the_plane_leaves_it_alone():
+    lattice = ml.Lattice.box((-1, 0.3, -1), (1, 1, 1), (3, 4, 3))
+    free = links.controls(lattice)
+    np.testing.assert_array_equal(links.mirrored(lattice, free, "y").matrix, free.matrix)
+
+
 def test_links_add_and_scale():
     up, down = links.camber(BOX, "x", "z"), links.thickness(BOX, "x", "z")
     both = up + 2 * down

@@ -1,5 +1,6 @@
 """Stages in a row: values, derivatives, riders, errors."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -77,6 +78,18 @@ def test_jax_differentiates_a_case_from_outside(case):
     np.testing.assert_allclose(jax.jit(jax.grad(objective))(t), inside, rtol=1e-12)
 
 
+def test_a_case_is_an_argument_of_jax_like_any_array(case):
+    inside = eqx.filter_jit(lambda case, values: case.points(values))(case, VALUES)
+    np.testing.assert_allclose(inside, case(VALUES).points, rtol=0, atol=1e-14)
+
+
+def test_a_case_without_stages_changes_nothing(ball):
+    case = ml.Pipeline(ball, [])
+    assert np.array_equal(case().points, ball.points)
+    assert np.all(np.asarray(case.pushforward(None, {})) == 0.0)
+    assert case.pullback(None, ball.points) == {}
+
+
 def test_other_points_move_as_the_surface_does(case, ball):
     flow = case.embed(np.asarray(ball.points)[::7] * 1.0)
     np.testing.assert_array_equal(flow(VALUES).points, case(VALUES).points[::7])
@@ -135,6 +148,30 @@ def test_the_proof_covers_both_directions(case):
     assert proof.mismatch < 1e-12
 
 
+class Ripple(ml.AbstractNumpyDeformer):
+    """Waves along x, in NumPy."""
+
+    @property
+    def size(self):
+        return 1
+
+    def move(self, points, controls):
+        return points + controls[0] * np.sin(3 * points[:, :1])
+
+
+def test_a_numpy_stage_is_proved_among_ours(ball):
+    box = ml.Lattice.around(ball, (3, 3, 3))
+    t, r = ml.variable("t", size=3, typical=0.1), ml.variable("r", typical=0.1)
+    thick, ripple = {t: links.thickness(box, "x", "z")}, {r: links.controls(Ripple())}
+    for stages in (
+        [ml.Stage(box, thick), ml.Stage(Ripple(), ripple)],
+        [ml.Stage(Ripple(), ripple), ml.Stage(box, thick)],
+    ):
+        proof = examine.proof(ml.Pipeline(ball, stages), {"t": [0.1, 0.2, 0.1], "r": 0.1})
+        assert proof.is_right and proof.method == "complex step"
+        assert proof.mismatch < 1e-10
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
@@ -146,6 +183,18 @@ def test_the_proof_covers_both_directions(case):
 def test_wrong_values_are_told(case, values, message):
     with pytest.raises(ParameterError, match=message):
         case(values)
+
+
+@pytest.mark.parametrize(
+    ("directions", "message"),
+    [
+        ({"x": 1.0}, "nothing named 'x'; there is: t, d"),
+        ({"t": 1.0}, "'t' has 4 numbers, got shape"),
+    ],
+)
+def test_wrong_directions_are_told(case, directions, message):
+    with pytest.raises(ParameterError, match=message):
+        case.pushforward(VALUES, directions)
 
 
 def test_wrong_links_and_cotangents_are_told(case, ball):

@@ -98,7 +98,27 @@ def mirrored(lattice: Lattice, link: Link, across: Across) -> Link:
     lower = places[:, axis] < -1e-9 * scale
     motion[lower] = motion[partner[lower]] * flip[:, None]
     motion[np.abs(places[:, axis]) <= 1e-9 * scale, axis] = 0.0
-    return Link(motion.reshape(lattice.size, -1), across)
+    both = Link(motion.reshape(lattice.size, -1), across)
+    _check_plane_kept(lattice, both, across)
+    return both
+
+
+def _check_plane_kept(lattice: Lattice, link: Link, across: Across) -> None:
+    """Refuse a link that would really move points off the plane, tried on a sample of them."""
+    rng = np.random.default_rng(0)
+    reach = np.abs(lattice.edges).sum(axis=0)
+    middle = lattice.origin + lattice.edges.sum(axis=0) / 2
+    places = middle + rng.uniform(-1, 1, (200, 3)) * reach  # twice as large as the box
+    places[:, AXES[across]] = 0.0
+    controls = link.matrix @ rng.uniform(-1, 1, link.size)
+    moved = np.asarray(lattice.bind(places)(controls))
+    off = np.abs(moved[:, AXES[across]]).max() / max(np.abs(controls).max(), 1e-300)
+    if off > 1e-9:
+        raise ParameterError(
+            f"this lattice moves points at {across} = 0 off that plane, by {off:.2g} of its "
+            f"controls' motion; make it symmetric about {across} = 0, or begin it there with "
+            f"clamped ends"
+        )
 
 
 def _stations(lattice: Lattice, along: Any, axis: AxisName, share: np.ndarray) -> Link:

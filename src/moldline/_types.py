@@ -9,6 +9,9 @@ from jaxtyping import Float, Int
 Array: TypeAlias = jax.Array | np.ndarray
 """Arrays of NumPy and of JAX are both welcome; what was read from a file is NumPy's."""
 
+ArrayLike: TypeAlias = Any
+"""An array, or nested lists of numbers."""
+
 Points: TypeAlias = Float[Array, "n 3"]
 Faces: TypeAlias = Int[Array, "m 3"]
 Vector: TypeAlias = Float[Array, "k"]

@@ -2,7 +2,7 @@
 
 import equinox as eqx
 
-from .._types import Array, Points, is_concrete
+from .._types import Array, ArrayLike, Points
 from .surface import as_points
 
 
@@ -11,8 +11,8 @@ class Cloud(eqx.Module):
 
     points: Points
 
-    def __init__(self, points: Array):
-        self.points = as_points(points) if is_concrete(points) else points
+    def __init__(self, points: ArrayLike):
+        self.points = as_points(points)
 
     def moved(self, points: Array) -> "Cloud":
         """A cloud of other points."""

@@ -3,7 +3,7 @@
 import equinox as eqx
 import numpy as np
 
-from .._types import Array, Points, is_concrete
+from .._types import Array, ArrayLike, Points
 from ..errors import GeometryError
 from .surface import as_points
 
@@ -22,8 +22,8 @@ class Grid(eqx.Module):
     points: Points
     shapes: tuple[tuple[int, int, int], ...] = eqx.field(static=True)
 
-    def __init__(self, points: Array, shapes: tuple[tuple[int, int, int], ...]):
-        self.points = as_points(points) if is_concrete(points) else points
+    def __init__(self, points: ArrayLike, shapes: tuple[tuple[int, int, int], ...]):
+        self.points = as_points(points)
         self.shapes = tuple((int(i), int(j), int(k)) for i, j, k in shapes)
 
     def __check_init__(self) -> None:

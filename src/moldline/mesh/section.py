@@ -3,7 +3,7 @@
 import equinox as eqx
 import numpy as np
 
-from .._types import Array, Points, is_concrete
+from .._types import Array, ArrayLike, Points
 from ..errors import GeometryError
 from .surface import as_points
 
@@ -25,8 +25,8 @@ class Section(eqx.Module):
     name: str = eqx.field(static=True)
     is_closed: bool = eqx.field(static=True)
 
-    def __init__(self, points: Array, name: str = "section", is_closed: bool = False):
-        self.points = as_points(points) if is_concrete(points) else points
+    def __init__(self, points: ArrayLike, name: str = "section", is_closed: bool = False):
+        self.points = as_points(points)
         self.name = name
         self.is_closed = is_closed
 

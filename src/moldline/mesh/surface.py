@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Int
 
-from .._types import Array, Faces, Points, is_concrete
+from .._types import Array, ArrayLike, Faces, Points, is_concrete
 from ..errors import GeometryError
 
 
@@ -36,14 +37,14 @@ class Surface(eqx.Module):
 
     def __init__(
         self,
-        points: Array,
-        faces: Array,
-        tags: Array | None = None,
+        points: ArrayLike,
+        faces: ArrayLike,
+        tags: ArrayLike | None = None,
         components: tuple[str, ...] | None = None,
         point_data: Mapping[str, Array] | None = None,
         face_data: Mapping[str, Array] | None = None,
     ):
-        self.points = points if not is_concrete(points) else as_points(points)
+        self.points = as_points(points)
         self.faces = np.asarray(faces, dtype=np.int32).reshape(-1, 3)
         self.tags = (
             np.zeros(len(self.faces), np.int32) if tags is None else np.asarray(tags, np.int32)
@@ -76,11 +77,14 @@ class Surface(eqx.Module):
         return np.unique(faces)
 
 
-def as_points(points: Array) -> Array:
-    """Float64 and of shape (n, 3); a JAX array stays one."""
-    if getattr(points, "ndim", None) != 2 or points.shape[1] != 3:
-        raise GeometryError(f"points must have the shape (n, 3), got {np.shape(points)}")
-    return points if points.dtype == np.float64 else np.asarray(points, dtype=np.float64)
+def as_points(points: ArrayLike) -> Array:
+    """Float64 and of shape (n, 3); a JAX array stays one, traced ones too."""
+    if not is_concrete(points):
+        return points
+    array = points if isinstance(points, jax.Array) else np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise GeometryError(f"points must have the shape (n, 3), got {array.shape}")
+    return array
 
 
 def check_indices(indices: Array, count: int, what: str) -> None:

@@ -6,7 +6,7 @@ import equinox as eqx
 import numpy as np
 from jaxtyping import Int
 
-from .._types import Array, Points, is_concrete
+from .._types import Array, ArrayLike, Points, is_concrete
 from ..errors import GeometryError
 from .surface import as_points, check_indices
 
@@ -52,13 +52,13 @@ class VolumeMesh(eqx.Module):
 
     def __init__(
         self,
-        points: Array,
+        points: ArrayLike,
         cells: Cells,
         markers: dict[str, Cells] | None = None,
         dimension: int = 3,
         extra: str = "",
     ):
-        self.points = as_points(points) if is_concrete(points) else points
+        self.points = as_points(points)
         self.cells = cells
         self.markers = dict(markers or {})
         self.dimension = dimension

@@ -27,7 +27,8 @@ ROOT = Path(__file__).parent.parent
 BLENDER = ROOT / ".venv-blender/bin/python"
 COLUMNS = (
     "vertices", "lattice", "embed", "copy", "deform", "x", "JVP", "VJP", "VJP/deform",
-    "follow", "follow/deform", "follow VJP", "bytes/vertex", "Blender", "Blender/deform", "paper",
+    "follow", "follow/deform", "follow VJP", "bytes/vertex", "Blender", "Blender/deform",
+    "its cores", "paper",
 )  # fmt: skip
 
 
@@ -85,7 +86,8 @@ def measured(size: int, count: int) -> dict[str, float | str]:
     row["follow VJP"] = median(lambda: follow_pull(vectors), 7)
     blender = blender_time(points, count)
     if blender is not None:
-        row |= {"Blender": blender, "Blender/deform": blender / deform}
+        row |= {"Blender": blender[0], "Blender/deform": blender[0] / deform}
+        row["its cores"] = blender[1]
     if count == 3 and size in PAPER:
         row["paper"] = PAPER[size]
     return row
@@ -101,8 +103,8 @@ def surface_points(size: int) -> np.ndarray:
     return np.stack(xyz, axis=-1).reshape(-1, 3)
 
 
-def blender_time(points: np.ndarray, count: int) -> float | None:
-    """Median time of Blender's lattice modifier [ms], None where it is not there."""
+def blender_time(points: np.ndarray, count: int) -> tuple[float, float] | None:
+    """Median time of Blender's lattice modifier [ms] and the cores it took; None without it."""
     script = Path(__file__).parent / "blender_lattice.py"
     if not BLENDER.exists() or not script.exists():
         return None
@@ -120,7 +122,9 @@ def blender_time(points: np.ndarray, count: int) -> float | None:
         if done.returncode:
             print(done.stderr[-500:], file=sys.stderr)
             return None
-        return 1e3 * float(np.median(np.load(result)["seconds"]))
+        found = np.load(result)
+        wall = float(np.median(found["seconds"]))
+        return 1e3 * wall, float(np.median(found["processor_seconds"])) / wall
 
 
 def median(call: Callable[[], object], repeats: int = 21) -> float:

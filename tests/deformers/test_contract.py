@@ -92,7 +92,6 @@ def test_a_deformer_keeps_the_contract(deformer, clause, cloud):
     clause(deformer, cloud)
 
 
-@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
 @pytest.mark.parametrize("name", OTHERS)
 def test_a_plug_in_keeps_the_contract(name, cloud):
     check(OTHERS[name], cloud[:60])
@@ -110,7 +109,6 @@ def test_a_numpy_plug_in_says_how_it_is_differentiated(cloud):
     assert OTHERS["wave"].method(cloud, np.array([0.1, 0.2])) == "complex step"
 
 
-@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
 def test_a_numpy_plug_in_that_drops_imaginary_parts_falls_back(cloud):
     assert OTHERS["fold"].method(cloud, np.array([0.1])) == "central differences"
 

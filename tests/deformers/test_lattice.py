@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import BSpline
+from scipy.spatial.transform import Rotation
 
 import moldline as ml
 from moldline.errors import GeometryError, ParameterError
@@ -208,6 +210,39 @@ def test_fast_forms_are_the_definition_everywhere(data, ends, outside):
     defined = np.asarray(lattice(points, controls))
     for form in (lattice.bind(points)(controls), lattice.follow(points, controls)):
         np.testing.assert_allclose(form, defined, rtol=1e-15, atol=1e-14)
+
+
+def by_scipy(shape, u, moves):
+    """Displacements from SciPy's splines, at box coordinates inside [0, 1]."""
+    weights = []
+    for count, place in zip(shape, u.T, strict=True):
+        degree = min(3, count - 1)
+        inner = np.linspace(0, 1, count - degree + 1)[1:-1]
+        knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
+        weights.append(BSpline(knots, np.eye(count), degree)(place))
+    return np.einsum("nu,nv,nw,uvwd->nd", *weights, moves)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    shape=st.sampled_from([(7, 4, 3), (4, 3, 2), (5, 1, 2)]),
+    turn=st.tuples(*[st.floats(-3, 3)] * 3),
+    origin=st.tuples(*[st.floats(-100, 100)] * 3),
+    u=st.lists(
+        st.tuples(*[st.one_of(st.sampled_from([0.0, 0.25, 0.5, 1.0]), st.floats(0, 1))] * 3),
+        min_size=1,
+        max_size=20,
+    ),
+)
+def test_any_box_moves_its_inside_as_scipys_splines_do(shape, turn, origin, u):
+    """Points on faces, edges and corners of a turned box count as in it, whatever the rounding."""
+    edges = Rotation.from_rotvec(turn).as_matrix() * [[2.0], [0.5], [1.0]]
+    lattice = ml.Lattice(origin, edges, shape)
+    u, moves = np.array(u), np.random.default_rng(0).uniform(-1, 1, (*shape, 3))
+    points = lattice.origin + u @ lattice.edges
+    expected = points + by_scipy(shape, u, moves)
+    # coordinates of 100 are known to 1e-14, so box coordinates too, and motion varies by 10 in one
+    np.testing.assert_allclose(lattice.bind(points)(moves.ravel()), expected, rtol=0, atol=1e-12)
 
 
 def test_many_points_in_threads_and_blocks_are_the_definition():

@@ -1,6 +1,7 @@
 """Deformers written in plain NumPy, with derivatives by complex step or central differences."""
 
 import abc
+import warnings
 from collections.abc import Callable
 from typing import Literal
 
@@ -45,8 +46,10 @@ class AbstractNumpyDeformer(AbstractDeformer):
         directions = np.ones_like(points), np.ones_like(controls)
         by_difference = _central(self.move, points, controls, *directions)
         try:
-            by_complex = _complex(self.move, points, controls, *directions)
-        except (TypeError, ValueError):
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", np.exceptions.ComplexWarning)
+                by_complex = _complex(self.move, points, controls, *directions)
+        except (TypeError, ValueError, np.exceptions.ComplexWarning):
             return "central differences"
         scale = np.abs(by_difference).max(initial=1.0)
         agrees = np.abs(by_complex - by_difference).max(initial=0.0) <= AGREEMENT * scale
@@ -66,12 +69,18 @@ def _complex(move, points, controls, motion, change) -> np.ndarray:  # type: ign
 
 
 def _central(move, points, controls, motion, change) -> np.ndarray:  # type: ignore[no-untyped-def]
-    size = max(np.abs(motion).max(initial=0.0), np.abs(change).max(initial=0.0), 1e-300)
-    reach = max(np.abs(points).max(initial=0.0), np.abs(controls).max(initial=0.0), 1.0)
-    h = CENTRAL_STEP * reach / size
-    ahead = move(points + h * motion, controls + h * change)
-    behind = move(points - h * motion, controls - h * change)
-    return (ahead - behind) / (2 * h)
+    """Points and controls one after the other, since millimetres and radians differ in size."""
+    by_points = _difference(lambda x: move(x, controls), points, motion)
+    by_controls = _difference(lambda c: move(points, c), controls, change)
+    return np.zeros_like(points) + by_points + by_controls
+
+
+def _difference(form: Callable, at: np.ndarray, along: np.ndarray) -> np.ndarray | float:
+    size = np.abs(along).max(initial=0.0)
+    if size == 0.0:
+        return 0.0
+    h = CENTRAL_STEP * max(np.abs(at).max(initial=0.0), 1.0) / size
+    return (form(at + h * along) - form(at - h * along)) / (2 * h)
 
 
 class Motion(AbstractKernel):

@@ -255,7 +255,7 @@ class LatticeBinding(AbstractBinding):
 
     def jacobian(self) -> scipy.sparse.csr_array:
         """Derivative of all coordinates by all controls, sparse, shape (3n, 3 nu nv nw)."""
-        return scipy.sparse.csr_array(scipy.sparse.kron(self.embedding.weights(), np.eye(3)))
+        return scipy.sparse.csr_array(scipy.sparse.kron(self.embedding.matrix(), np.eye(3)))
 
 
 def _located(axis: bspline.Axis, u: Array) -> tuple[Array, Array]:

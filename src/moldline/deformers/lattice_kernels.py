@@ -26,36 +26,32 @@ class Embedding:
         self.lattice = lattice
         self.points = points
         self.blocks = cellwise.blocks(lattice.axes, (points - lattice.origin) @ lattice.inverse)
+        self.weights = lattice.following.weights
         self.displace = Displacement(self)
         self.move = Motion(self)
         self.gather = Gathering(self)
 
-    def weights(self) -> scipy.sparse.csr_array:
+    def matrix(self) -> scipy.sparse.csr_array:
         """Weight of each control point at each point, shape (n, nu nv nw), frozen ones zero."""
         u = (self.points - self.lattice.origin) @ self.lattice.inverse
-        factors = [_taps(axis, u[:, i]) for i, axis in enumerate(self.lattice.axes)]
-        (iu, wu), (iv, wv), (iw, ww) = factors
+        (iu, wu), (iv, wv), (iw, ww) = (self._taps(i, u[:, i]) for i in range(3))
         _, nv, nw = self.lattice.shape
         column = (iu[:, :, None, None] * nv + iv[:, None, :, None]) * nw + iw[:, None, None, :]
         value = wu[:, :, None, None] * wv[:, None, :, None] * ww[:, None, None, :]
         value = np.where(self.lattice.frozen.ravel()[column], 0.0, value)
         row = np.broadcast_to(np.arange(len(u))[:, None, None, None], column.shape)
         shape = (len(u), self.lattice.size // 3)
-        weights = scipy.sparse.coo_array((value.ravel(), (row.ravel(), column.ravel())), shape)
-        weights = weights.tocsr()
-        weights.eliminate_zeros()
-        return weights
+        matrix = scipy.sparse.coo_array((value.ravel(), (row.ravel(), column.ravel())), shape)
+        matrix = matrix.tocsr()
+        matrix.eliminate_zeros()
+        return matrix
 
-
-def _taps(axis: "cellwise.Axis", u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The few control points that act on each coordinate along one axis, and their weights."""
-    acting = np.any(axis.powers != 0, axis=1)
-    width = max(int(acting.sum(axis=1).max()), 1)
-    index = np.argsort(~acting, axis=1, kind="stable")[:, :width]
-    cell, t = cellwise.located(axis, u)
-    polynomials = np.take_along_axis(axis.powers, index[:, None, :], axis=2)[cell]
-    weight = np.einsum("na,nak->nk", t[:, None] ** np.arange(axis.terms), polynomials)
-    return index[cell], weight
+    def _taps(self, number: int, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The few control points that act on each coordinate along one axis, and their weights."""
+        cell, t = cellwise.located(self.lattice.axes[number], u)
+        near = self.weights.near[number]
+        index = self.weights.first[number][cell, None] + np.arange(near.shape[2])
+        return index, np.einsum("na,nak->nk", t[:, None] ** np.arange(near.shape[1]), near[cell])
 
 
 class Displacement(AbstractKernel):
@@ -66,8 +62,8 @@ class Displacement(AbstractKernel):
 
     @override
     def run(self, moves: np.ndarray) -> tuple[np.ndarray, ...]:
-        table = cellwise.coefficients(self.embedding.lattice.axes, moves)
-        return (cellwise.displaced(self.embedding.blocks, table, None),)
+        e = self.embedding
+        return (cellwise.displaced(e.blocks, e.weights, moves, None),)
 
     @override
     def plain(self, moves: Array) -> tuple[Array, ...]:
@@ -90,8 +86,8 @@ class Motion(AbstractKernel):
 
     @override
     def run(self, moves: np.ndarray) -> tuple[np.ndarray, ...]:
-        table = cellwise.coefficients(self.embedding.lattice.axes, moves)
-        return (cellwise.displaced(self.embedding.blocks, table, self.embedding.points),)
+        e = self.embedding
+        return (cellwise.displaced(e.blocks, e.weights, moves, e.points),)
 
     @override
     def plain(self, moves: Array) -> tuple[Array, ...]:
@@ -110,9 +106,8 @@ class Gathering(AbstractKernel):
 
     @override
     def run(self, vectors: np.ndarray) -> tuple[np.ndarray, ...]:
-        axes = self.embedding.lattice.axes
-        moments = cellwise.moments(self.embedding.blocks, axes, vectors)
-        return (cellwise.gathered(axes, moments),)
+        e = self.embedding
+        return (cellwise.pulled_back(e.blocks, e.weights, vectors),)
 
     @override
     def plain(self, vectors: Array) -> tuple[Array, ...]:
@@ -134,16 +129,13 @@ class Following(AbstractKernel):
     def __init__(self, lattice: "Lattice"):
         self.lattice = lattice
         self.box = cellwise.Box.of(lattice.origin, lattice.inverse, lattice.axes)
+        self.weights = cellwise.Weights.of(lattice.axes)
         self.push = Push(self)
         self.pull = Pull(self)
 
-    def table(self, moves: np.ndarray) -> np.ndarray:
-        """Polynomial coefficients of a field."""
-        return cellwise.coefficients(self.lattice.axes, moves)
-
     @override
     def run(self, points: np.ndarray, moves: np.ndarray) -> tuple[np.ndarray, ...]:
-        return (cellwise.followed(self.box, self.table(moves), points),)
+        return (cellwise.followed(self.box, self.weights, moves, points),)
 
     @override
     def plain(self, points: Array, moves: Array) -> tuple[Array, ...]:
@@ -164,8 +156,8 @@ class Push(AbstractKernel):
     def run(
         self, points: np.ndarray, moves: np.ndarray, motion: np.ndarray, change: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        tables = self.value.table(moves), self.value.table(change)
-        return (cellwise.pushed(self.value.box, *tables, points, motion),)
+        v = self.value
+        return (cellwise.pushed(v.box, v.weights, moves, change, points, motion),)
 
     @override
     def plain(self, points: Array, moves: Array, motion: Array, change: Array) -> tuple[Array, ...]:
@@ -187,9 +179,7 @@ class Pull(AbstractKernel):
     def run(
         self, points: np.ndarray, moves: np.ndarray, vectors: np.ndarray
     ) -> tuple[np.ndarray, ...]:
-        box, table = self.value.box, self.value.table(moves)
-        at_points, moments = cellwise.pulled(box, table, points, vectors)
-        return at_points, cellwise.gathered(self.value.lattice.axes, moments)
+        return cellwise.pulled(self.value.box, self.value.weights, moves, points, vectors)
 
     @override
     def plain(self, points: Array, moves: Array, vectors: Array) -> tuple[Array, ...]:

@@ -21,41 +21,54 @@ THREAD_WORTH = 16384
 """Points that are worth a thread of their own."""
 
 
-def _terms(table: np.ndarray) -> loops.Terms:
-    """The size of the polynomials of a table (cells, 3, P, Q, R), as the loops want it."""
-    p, q, r = table.shape[2:]
-    return (0,) * p, (0,) * q, (0,) * r
+class Weights(NamedTuple):
+    """For each axis and cell the first control point that acts, and the powers of those that do."""
+
+    first: tuple[np.ndarray, np.ndarray, np.ndarray]
+    near: tuple[np.ndarray, np.ndarray, np.ndarray]
+    counts: tuple[int, int, int]
+
+    @classmethod
+    def of(cls, axes: Axes) -> "Weights":
+        """Those of three axes; `near` has the shape (cells, terms, acting control points)."""
+        found = [_acting(axis) for axis in axes]
+        first, near = (tuple(part) for part in zip(*found, strict=True))
+        return cls(first, near, tuple(axis.size for axis in axes))  # type: ignore[arg-type]
+
+    @property
+    def terms(self) -> loops.Terms:
+        """The size of the polynomials, as the loops want it."""
+        p, q, r = (table.shape[1] for table in self.near)
+        return (0,) * p, (0,) * q, (0,) * r
+
+    @property
+    def cells(self) -> np.ndarray:
+        """Numbers of all cells."""
+        return np.arange(np.prod([len(first) for first in self.first]))
 
 
-def coefficients(axes: Axes, moves: np.ndarray) -> np.ndarray:
+def _acting(axis: Axis) -> tuple[np.ndarray, np.ndarray]:
+    acts = np.any(axis.powers != 0, axis=1)
+    first, last = acts.argmax(axis=1), axis.size - acts[:, ::-1].argmax(axis=1)
+    width = int(np.where(acts.any(axis=1), last - first, 1).max())
+    first = np.minimum(first, axis.size - width)
+    columns = first[:, None] + np.arange(width)
+    return first, np.take_along_axis(axis.powers, columns[:, None, :], axis=2)
+
+
+def coefficients(weights: Weights, cells: np.ndarray, moves: np.ndarray) -> np.ndarray:
     """Polynomial coefficients (cells, 3, P, Q, R) from control displacements (nu, nv, nw, 3)."""
-    table = moves
-    for i, axis in enumerate(axes):
-        table = _along(axis.powers.reshape(-1, axis.size), table, i)
-    split = [size for axis in axes for size in axis.powers.shape[:2]]
-    table = table.reshape(*split, 3).transpose(0, 2, 4, 6, 1, 3, 5)
-    return np.ascontiguousarray(table).reshape(-1, *table.shape[3:])
-
-
-def gathered(axes: Axes, moments: np.ndarray) -> np.ndarray:
-    """The transpose of `coefficients`: control cotangents (nu, nv, nw, 3) from moments."""
-    split = [len(axis.starts) for axis in axes]
-    table = moments.reshape(*split, *moments.shape[1:]).transpose(0, 4, 1, 5, 2, 6, 3)
-    table = table.reshape(*(axis.powers[..., 0].size for axis in axes), 3)
-    for i, axis in enumerate(axes):
-        table = _along(axis.powers.reshape(-1, axis.size).T, table, i)
+    p, q, r = map(len, weights.terms)
+    table = np.empty((len(cells), 3, p, q, r))
+    loops.fill(weights.terms, weights.first, weights.near, cells, moves, table)
     return table
 
 
-def _along(matrix: np.ndarray, table: np.ndarray, axis: int) -> np.ndarray:
-    """A matrix times one axis of a table.
-
-    A compiled loop, since the threads of a BLAS go on spinning for a while after a product and
-    would slow the loops that follow.
-    """
-    front = np.ascontiguousarray(np.moveaxis(table, axis, 0))
-    result = loops.product(np.ascontiguousarray(matrix), front.reshape(len(front), -1))
-    return np.moveaxis(result.reshape(-1, *front.shape[1:]), 0, axis)
+def gathered(weights: Weights, cells: np.ndarray, moments: np.ndarray) -> np.ndarray:
+    """The transpose of `coefficients`: control cotangents (nu, nv, nw, 3) from moments."""
+    result = np.zeros((*weights.counts, 3))
+    loops.collect(weights.terms, weights.first, weights.near, cells, moments, result)
+    return result
 
 
 def located(axis: Axis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -65,13 +78,17 @@ def located(axis: Axis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Blocks(NamedTuple):
-    """Points sorted by cell, in blocks of one size; places that nothing fills have order -1."""
+    """Points sorted by cell, in blocks of one size; places that nothing fills have order -1.
+
+    `cells` counts among the cells that hold points, whose numbers are `used`.
+    """
 
     x: np.ndarray
     y: np.ndarray
     z: np.ndarray
     order: np.ndarray
     cells: np.ndarray
+    used: np.ndarray
     length: int
 
 
@@ -96,7 +113,8 @@ def blocks(axes: Axes, u: np.ndarray) -> Blocks:
         y=local[1].reshape(rows, size),
         z=local[2].reshape(rows, size),
         order=sorted_order.reshape(rows, size),
-        cells=np.repeat(used, needed).astype(np.int32),
+        cells=np.repeat(np.arange(len(used), dtype=np.int32), needed),
+        used=used.astype(np.int64),
         length=len(u),
     )
 
@@ -107,22 +125,27 @@ def _block_size(points: int, cells: int) -> int:
     return next((size for size in (256, 128, 64, 32) if filling >= 4 * size), 16)
 
 
-def displaced(b: Blocks, table: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
+def displaced(
+    b: Blocks, weights: Weights, moves: np.ndarray, rest: np.ndarray | None
+) -> np.ndarray:
     """Displacements of the blocks' points in their own order, added to `rest` where given."""
     out = empty((b.length, 3))
+    table = coefficients(weights, b.used, moves)
     base = np.empty((0, 3)) if rest is None else rest
     least = THREAD_WORTH // b.x.shape[1]
-    spread(loops.forward, len(b.cells), _terms(table), *b[:5], table, base, out, least=least)
+    spread(loops.forward, len(b.cells), weights.terms, *b[:5], table, base, out, least=least)
     return out
 
 
-def moments(b: Blocks, axes: Axes, vectors: np.ndarray) -> np.ndarray:
-    """Per cell the sum over its points of vector times monomials: shape (cells, 3, P, Q, R)."""
-    terms = tuple((0,) * axis.terms for axis in axes)
-    cells = int(np.prod([len(axis.starts) for axis in axes]))
+def pulled_back(b: Blocks, weights: Weights, vectors: np.ndarray) -> np.ndarray:
+    """The transpose of `displaced`: control cotangents from those of the points.
+
+    Per cell it sums the points' vectors times the monomials, shape (cells, 3, P, Q, R).
+    """
     least = THREAD_WORTH // b.x.shape[1]
-    parts = spread(loops.moments, len(b.cells), terms, *b[:5], vectors, cells, least=least)
-    return sum(parts[1:], parts[0])
+    arguments = weights.terms, *b[:5], vectors, len(b.used)
+    parts = spread(loops.moments, len(b.cells), *arguments, least=least)
+    return gathered(weights, b.used, sum(parts[1:], parts[0]))
 
 
 class Box(NamedTuple):
@@ -146,30 +169,37 @@ class Box(NamedTuple):
         )
 
 
-def followed(box: Box, table: np.ndarray, points: np.ndarray) -> np.ndarray:
+def followed(box: Box, weights: Weights, moves: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points moved by the field, each evaluated where it is now."""
     out = empty(points.shape)
-    spread(
-        loops.follow, len(points), _terms(table), *box, table, points, out, least=THREAD_WORTH // 4
-    )
+    table = coefficients(weights, weights.cells, moves)
+    arguments = weights.terms, *box, table, points, out
+    spread(loops.follow, len(points), *arguments, least=THREAD_WORTH // 4)
     return out
 
 
 def pushed(
-    box: Box, table: np.ndarray, change: np.ndarray, points: np.ndarray, motion: np.ndarray
+    box: Box,
+    weights: Weights,
+    moves: np.ndarray,
+    change: np.ndarray,
+    points: np.ndarray,
+    motion: np.ndarray,
 ) -> np.ndarray:
-    """Derivative of `followed` along a change of the coefficients and a motion of the points."""
+    """Derivative of `followed` along a change of the controls and a motion of the points."""
     out = empty(points.shape)
-    arguments = _terms(table), *box, table, change, points, motion, out
+    tables = (coefficients(weights, weights.cells, m) for m in (moves, change))
+    arguments = weights.terms, *box, *tables, points, motion, out
     spread(loops.push, len(points), *arguments, least=THREAD_WORTH // 4)
     return out
 
 
 def pulled(
-    box: Box, table: np.ndarray, points: np.ndarray, vectors: np.ndarray
+    box: Box, weights: Weights, moves: np.ndarray, points: np.ndarray, vectors: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The transpose of `pushed`: cotangents of the points, and moments per cell."""
+    """The transpose of `pushed`: cotangents of the points and of the controls."""
     out = empty(points.shape)
-    arguments = _terms(table), *box, table, points, vectors, out
+    table = coefficients(weights, weights.cells, moves)
+    arguments = weights.terms, *box, table, points, vectors, out
     parts = spread(loops.pull, len(points), *arguments, least=THREAD_WORTH // 4)
-    return out, sum(parts[1:], parts[0])
+    return out, gathered(weights, weights.cells, sum(parts[1:], parts[0]))

@@ -19,17 +19,72 @@ _reordering = numba.njit(
 
 
 @_compiled
-def product(matrix, table):
-    """A mostly empty matrix times a table."""
-    rows, inner = matrix.shape
-    result = np.zeros((rows, table.shape[1]))
-    for i in range(rows):
-        for k in range(inner):
-            weight = matrix[i, k]
-            if weight != 0.0:
-                for j in range(table.shape[1]):
-                    result[i, j] += weight * table[k, j]
-    return result
+def fill(terms, first, near, cells, moves, table):
+    """Coefficients of each cell from the displacements of its control points, axis by axis."""
+    P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
+    na, nb, nc = near[0].shape[2], near[1].shape[2], near[2].shape[2]
+    one, two = np.empty((P, nb, nc, 3)), np.empty((P, Q, nc, 3))
+    for m in range(len(cells)):
+        k = cells[m] % len(first[2])
+        j = cells[m] // len(first[2]) % len(first[1])
+        i = cells[m] // (len(first[2]) * len(first[1]))
+        u, v, w = first[0][i], first[1][j], first[2][k]
+        one[:] = 0.0
+        for p in range(P):
+            for a in range(na):
+                for b in range(nb):
+                    for c in range(nc):
+                        for d in range(3):
+                            one[p, b, c, d] += near[0][i, p, a] * moves[u + a, v + b, w + c, d]
+        two[:] = 0.0
+        for p in range(P):
+            for q in range(Q):
+                for b in range(nb):
+                    for c in range(nc):
+                        for d in range(3):
+                            two[p, q, c, d] += near[1][j, q, b] * one[p, b, c, d]
+        for d in range(3):
+            for p in range(P):
+                for q in range(Q):
+                    for r in range(R):
+                        s = 0.0
+                        for c in range(nc):
+                            s += near[2][k, r, c] * two[p, q, c, d]
+                        table[m, d, p, q, r] = s
+
+
+@_compiled
+def collect(terms, first, near, cells, moments, result):
+    """The transpose of `fill`."""
+    P, Q, R = len(terms[0]), len(terms[1]), len(terms[2])
+    na, nb, nc = near[0].shape[2], near[1].shape[2], near[2].shape[2]
+    one, two = np.empty((P, nb, nc, 3)), np.empty((P, Q, nc, 3))
+    for m in range(len(cells)):
+        k = cells[m] % len(first[2])
+        j = cells[m] // len(first[2]) % len(first[1])
+        i = cells[m] // (len(first[2]) * len(first[1]))
+        u, v, w = first[0][i], first[1][j], first[2][k]
+        for p in range(P):
+            for q in range(Q):
+                for c in range(nc):
+                    for d in range(3):
+                        s = 0.0
+                        for r in range(R):
+                            s += near[2][k, r, c] * moments[m, d, p, q, r]
+                        two[p, q, c, d] = s
+        one[:] = 0.0
+        for p in range(P):
+            for q in range(Q):
+                for b in range(nb):
+                    for c in range(nc):
+                        for d in range(3):
+                            one[p, b, c, d] += near[1][j, q, b] * two[p, q, c, d]
+        for p in range(P):
+            for a in range(na):
+                for b in range(nb):
+                    for c in range(nc):
+                        for d in range(3):
+                            result[u + a, v + b, w + c, d] += near[0][i, p, a] * one[p, b, c, d]
 
 
 @_compiled

@@ -70,7 +70,8 @@ def _run_now(*arrays: Any, kernel: AbstractKernel) -> list[Any]:
 
 
 def _is_on_host(array: Any) -> bool:
-    return isinstance(array, np.ndarray) or all(d.platform == "cpu" for d in array.devices())
+    # arrays of NumPy, and the typed ones that JAX wraps them in, have no device
+    return all(d.platform == "cpu" for d in array.devices()) if hasattr(array, "devices") else True
 
 
 def _shapes(*arrays: Any, kernel: AbstractKernel) -> list[Any]:

@@ -95,6 +95,17 @@ def test_check_fails_where_space_folds_and_the_mesh_tears(capsys, tmp_path, ball
     assert "NOT sound" in told
 
 
+def test_a_rider_is_written_in_its_own_unit(tmp_path, ball_file):
+    (tmp_path / "case.toml").write_text(
+        'moldline = 1\n[geometry.b]\nfile = "ball.tri"\nunits = "m"\n'
+        '[rider.r]\nfile = "ball.tri"\nunits = "in"\n'
+    )
+    target = tmp_path / "rider.tri"
+    case = str(tmp_path / "case.toml")
+    assert main(["deform", case, "--rider", "r", "-o", str(target)]) == 0
+    np.testing.assert_allclose(ml.read(target).points, ml.read(ball_file).points, rtol=1e-15)
+
+
 def test_check_of_a_geometry_file_tells_its_health(capsys, ball_file):
     assert main(["check", ball_file]) == 0
     assert "closed, manifold, consistently oriented" in capsys.readouterr().out

@@ -44,9 +44,10 @@ class Case:
     pipeline: Pipeline
     riders: dict[str, Pipeline]
 
-    @property
-    def units(self) -> str | None:
-        """The unit of the resulting geometry's file."""
+    def units(self, rider: str | None = None) -> str | None:
+        """The unit of the resulting geometry's file, or of a rider's."""
+        if rider is not None:
+            return self.tables.rider[rider].units
         return self.tables.geometry[self.pipeline.result].units
 
     def values(self, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:

@@ -4,7 +4,8 @@ import argparse
 import importlib
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 COMMANDS = ("deform", "sensitivity", "check", "info", "convert", "plot", "schema")
 
@@ -64,6 +65,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return 130
+
+
+def in_steps(**steps: Callable[[], Any]) -> list[Any]:
+    """What each step returns; after two seconds a bar on the error stream tells how far it is."""
+    from tqdm import tqdm
+
+    results = []
+    with tqdm(total=len(steps), delay=2, leave=False) as bar:
+        for name, step in steps.items():
+            bar.set_description(name.replace("_", " "), refresh=False)
+            results.append(step())
+            bar.update()
+    return results
 
 
 def show(report: dict, as_json: bool, lines: Sequence[str]) -> None:

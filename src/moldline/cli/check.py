@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from . import show, values
+from . import in_steps, show, values
 
 if TYPE_CHECKING:
     from ..mesh import Geometry
@@ -75,11 +75,13 @@ def _deformation(
 
     from ..pipeline import examine
 
-    fold = examine.folding(pipeline, chosen)
-    torn = examine.tears(pipeline, chosen)
-    proof = examine.proof(pipeline, chosen)
-    turned = examine.turned_faces(pipeline, chosen)
-    inverted = examine.inverted_cells(pipeline, chosen)
+    fold, torn, turned, inverted, proof = in_steps(
+        folds=lambda: examine.folding(pipeline, chosen),
+        tears=lambda: examine.tears(pipeline, chosen),
+        turned_faces=lambda: examine.turned_faces(pipeline, chosen),
+        inverted_cells=lambda: examine.inverted_cells(pipeline, chosen),
+        derivatives=lambda: examine.proof(pipeline, chosen),
+    )
     x, y, z = fold.place
     order = "linear, remainder at rounding" if proof.forward.is_linear else (
         f"order {proof.forward.order:.3f} of the Taylor remainder (2 is right)"

@@ -41,7 +41,7 @@ def run(given: argparse.Namespace) -> int:
     start = time.perf_counter()
     shape = pipeline(chosen)
     seconds = time.perf_counter() - start
-    write(target, shape, units=case.units)
+    write(target, shape, units=case.units(given.rider))
     rest = np.asarray(pipeline.geometry.points)
     moved = float(np.linalg.norm(np.asarray(shape.points) - rest, axis=1).max())
     torn = examine.tears(pipeline, chosen)

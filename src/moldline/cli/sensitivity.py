@@ -41,7 +41,7 @@ def run(given: argparse.Namespace) -> int:
         for name in names
         for label, column in case.pipeline.labelled_sensitivity(chosen, name).items()
     }
-    write_sensitivities(target, case.pipeline(chosen), columns, units=case.units)
+    write_sensitivities(target, case.pipeline(chosen), columns, units=case.units())
     largest = {k: float(np.linalg.norm(c, axis=1).max()) for k, c in columns.items()}
     reach = {k: int(np.count_nonzero(np.any(c != 0, axis=1))) for k, c in columns.items()}
     report = {"file": str(target), "largest": largest, "points_moved": reach}

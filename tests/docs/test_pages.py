@@ -30,3 +30,13 @@ def test_every_case_file_in_the_docs_is_valid():
             tomllib.loads(block)
             found += 1
     assert found >= 1
+
+
+def test_every_file_that_a_page_includes_is_there():
+    included = []
+    for page in DOCS.rglob("*.md"):
+        text = page.read_text()
+        assert "8 <" not in text, f"{page.name}: an include that was taken for Python"
+        included += re.findall(r'^--8<-- "(.*)"$', text, re.M)
+    assert included
+    assert all((DOCS.parent / name).is_file() for name in included)

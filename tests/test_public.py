@@ -6,8 +6,8 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "Cloud", "Geometry", "Grid",
-    "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage", "Surface", "Variable",
+    "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "Cloud", "ControlVolume",
+    "Geometry", "Grid", "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage", "Surface", "Variable",
     "VolumeMesh", "errors", "links", "load", "plot", "read", "variable", "write",
     "write_sensitivities",
 }  # fmt: skip

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from . import errors, plot
     from .case import load
     from .deformers.base import AbstractBinding, AbstractDeformer, LinearBinding
+    from .deformers.control_volume import ControlVolume
     from .deformers.foreign import AbstractNumpyDeformer
     from .deformers.lattice import Lattice
     from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
@@ -33,6 +34,7 @@ _HOMES = {
     "AbstractDeformer": "deformers.base",
     "AbstractNumpyDeformer": "deformers.foreign",
     "Cloud": "mesh",
+    "ControlVolume": "deformers.control_volume",
     "Geometry": "mesh",
     "Grid": "mesh",
     "Lattice": "deformers.lattice",

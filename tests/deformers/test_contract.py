@@ -7,6 +7,7 @@ import pytest
 import moldline as ml
 from moldline import registry
 from moldline.deformers.contract import CLAUSES, check, derivatives_by_points_are_right
+from moldline.deformers.volume_frame import Box
 
 SHEARED = [[2.0, 0.0, 0.0], [1.0, 3.0, 0.2], [0.0, 0.3, 1.0]]
 
@@ -26,7 +27,30 @@ LATTICES = {
 }
 
 
-EXAMPLES = {"lattice": LATTICES}
+def bent(counts, low=-1.2, high=1.2, **options):
+    """A curved box around the cloud."""
+    lines = [np.linspace(low, high, counts[0]), *(np.linspace(-1.2, 1.2, n) for n in counts[1:])]
+    x, y, z = np.meshgrid(*lines, indexing="ij")
+    points = np.stack([x + 0.1 * y * z, y + 0.1 * np.sin(2 * x), z + 0.05 * x * y], axis=-1)
+    return Box.of(options.pop("name", "1"), points, **options)
+
+
+def turned(box):
+    """The same box with its axes in another order and direction."""
+    return Box.of("2", box.points[:, ::-1].transpose(1, 2, 0, 3))
+
+
+VOLUMES = {
+    "bent": ml.ControlVolume([bent((6, 5, 4))], outside="keep"),
+    "bernstein": ml.ControlVolume([bent((5, 3, 2), degree=9)], outside="keep"),
+    "two": ml.ControlVolume(
+        [bent((4, 4, 3), -1.2, 0.1), turned(bent((4, 4, 3), 0.1, 1.2))], outside="keep"
+    ),
+    "frozen": ml.ControlVolume([bent((8, 4, 4))], outside="keep", freeze=("i+",)),
+}
+
+
+EXAMPLES = {"lattice": LATTICES, "control_volume": VOLUMES}
 """Variants of each deformer of ours, by the name it is registered under."""
 
 CASES = [

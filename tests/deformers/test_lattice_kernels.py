@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import moldline as ml
-from moldline.deformers.lattice_kernels import Embedding
 
 LATTICES = {
     "turned": ml.Lattice(
@@ -22,10 +21,11 @@ def kernels(lattice):
     rng = np.random.default_rng(1)
     moves, change = 0.1 * rng.normal(size=(2, *lattice.shape, 3))
     motion, vectors = rng.normal(size=(2, COUNT, 3))
-    embedding, following = Embedding(lattice, POINTS), lattice.following
+    embedding, following = lattice.bind(POINTS).embedding, lattice.following
+    rows = moves.reshape(-1, 3)
     return {
-        "displacement": (embedding.displace, (moves,), (0,)),
-        "motion": (embedding.move, (moves,), ()),
+        "displacement": (embedding.displace, (rows,), (0,)),
+        "motion": (embedding.move, (rows,), ()),
         "gathering": (embedding.gather, (vectors,), (0,)),
         "following": (following, (POINTS, moves), ()),
         "push": (following.push, (POINTS, moves, motion, change), (2, 3)),

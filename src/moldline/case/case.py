@@ -81,6 +81,10 @@ class Case:
         if target.parent.resolve() != self.path.parent.resolve():
             for table in (*tables["geometry"].values(), *tables.get("rider", {}).values()):
                 table["file"] = str((self.path.parent / table["file"]).resolve())
+            for table in tables.get("stage", []):
+                for key, option in registry.deformer(table["deformer"]).options().items():
+                    if option.annotation is Path and key in table:
+                        table[key] = str((self.path.parent / table[key]).resolve())
         with replacing(target) as stream:
             stream.write(tomli_w.dumps(_without_none(tables)).encode())
 
@@ -109,7 +113,9 @@ def load(path: str | os.PathLike[str]) -> Case:
             name: pipeline.embed(_read(place, table, f"rider.{name}"), table.on, name)
             for name, table in tables.rider.items()
         }
-    except ParameterError as error:
+    except MoldlineError as error:
+        if isinstance(error, CaseError):
+            raise
         raise CaseError(f"{file}: {error}") from None
     return Case(place, tables, pipeline, riders)
 
@@ -144,9 +150,9 @@ def _stage(
     try:
         cls = registry.deformer(table.deformer)
         model = options.of_deformer(table.deformer, cls)
-        deformer = cls.build(
-            geometries[on], **schema.checked(model, table.model_extra or {}, file, where)
-        )
+        given = schema.checked(model, table.model_extra or {}, file, where)
+        places = {k: Path(file).parent / v for k, v in given.items() if isinstance(v, Path)}
+        deformer = cls.build(geometries[on], **given | places)
         links: dict[Variable, Link] = {}
         for i, row in enumerate(table.link):
             place = f"{where}.link.{i}"
@@ -158,8 +164,8 @@ def _stage(
             known = variables[row.variable]
             link = _link(file, place, row, deformer)
             links[known] = links[known] + link if known in links else link
-        return Stage(deformer, links, on, table.name)
-    except (ParameterError, MoldlineError) as error:
+        return Stage(deformer, links, on, table.name, table.carried)
+    except MoldlineError as error:
         if isinstance(error, CaseError):
             raise
         raise CaseError(f"{file}: {where}: {error}") from None

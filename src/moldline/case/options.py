@@ -37,7 +37,7 @@ def of_link(name: str, function: Callable[..., Any]) -> type[BaseModel]:
     parameters.pop(next(iter(parameters)))
     if any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
         where = dict(inspect.signature(chosen_controls).parameters)
-        where.pop("lattice")
+        where.pop("net")
         parameters = {k: p for k, p in parameters.items() if p.kind is not p.VAR_KEYWORD} | where
     return model_of(name, parameters)
 

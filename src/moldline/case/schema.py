@@ -70,6 +70,9 @@ class StageTable(BaseModel):
     deformer: str
     name: str = ""
     on: str = Field("", description="the geometry it acts on; not needed where there is one")
+    carried: bool = Field(
+        False, description="bound at rest and carried along by the stages before, as a child box"
+    )
     link: list[LinkTable] = Field(default_factory=list)
 
 

@@ -4,27 +4,26 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
-import scipy.sparse
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Array, Points, Vector, is_concrete
 from ..errors import GeometryError, ParameterError
 from ..numerics import bspline
-from .base import AbstractBinding, AbstractDeformer, DefinedBinding
-from .lattice_kernels import Embedding, Following
+from ..numerics.tensor_spline import evaluated
+from .base import AbstractBinding, DefinedBinding
+from .embedding import EmbeddedBinding, Embedding, Part
+from .lattice_kernels import Following
+from .net import AXES, AbstractControlNet
 
 Triple = tuple[int, int, int]
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 Basis = Literal["b-spline", "bernstein"]
 
-AXES = {"x": 0, "y": 1, "z": 2}
 
-
-class Lattice(AbstractDeformer):
+class Lattice(AbstractControlNet):
     """Move what is inside a box by its control points.
 
     A point moves by the sum of the control points' displacements, each with its tensor-product
@@ -175,19 +174,36 @@ class Lattice(AbstractDeformer):
         return 3 * self.shape[0] * self.shape[1] * self.shape[2]
 
     @property
+    @override
     def rest(self) -> Float[np.ndarray, "nu nv nw 3"]:
         """Control points at rest [m]."""
         u, v, w = np.meshgrid(*(axis.rest for axis in self.axes), indexing="ij")
         return self.origin + np.stack([u, v, w], axis=-1) @ self.edges
 
-    def moved(self, controls: Vector) -> Float[Array, "nu nv nw 3"]:
-        """Control points where the controls put them [m]."""
-        return self.rest + self.moves(controls)
-
+    @override
     def moves(self, controls: Vector) -> Float[Array, "nu nv nw 3"]:
         """Displacements of the control points [m], zero for the frozen ones."""
         return controls.reshape(*self.shape, 3) * ~self.frozen[..., None]
 
+    @override
+    def numbers(self, index: Any) -> Int[np.ndarray, "c"]:
+        rows = np.asarray(index, int)
+        if rows.ndim != 2 or rows.shape[1] != 3 or np.any((rows < 0) | (rows >= self.shape)):
+            raise ParameterError(f"indices (i, j, k) of a lattice of {self.shape}, got {index}")
+        return np.ravel_multi_index(tuple(rows.T), self.shape)
+
+    @override
+    def grids(self, places: Points) -> list[Float[np.ndarray, "_ _ _ 3"]]:
+        return [np.asarray(places).reshape(*self.shape, 3)]
+
+    @override
+    def samples(self, most: int) -> Points:
+        side = int(most ** (1 / 3))
+        lines = [axis.samples(side) for axis in self.axes]
+        u = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
+        return self.origin + u @ self.edges
+
+    @override
     def direction(self, axis: str) -> Float[np.ndarray, "3"]:
         """Unit vector of one of the lattice's own axes."""
         edge = self.edges[AXES[axis]]
@@ -199,26 +215,27 @@ class Lattice(AbstractDeformer):
 
     def field(self, points: Points, moves: Float[Array, "nu nv nw 3"]) -> Points:
         """Displacements of points by displacements of the control points [m]."""
-        powers = [axis.powers for axis in self.axes]
-        table = jnp.einsum("iau,jbv,kcw,uvwd->ijkdabc", *powers, moves, optimize="optimal")
-        table = table.reshape(-1, *table.shape[3:])
         u = (jnp.asarray(points) - self.origin) @ self.inverse
-        found = [_located(axis, u[:, i]) for i, axis in enumerate(self.axes)]
-        cells, local = zip(*found, strict=True)
-        lengths = [len(axis.starts) for axis in self.axes]
-        row = (cells[0] * lengths[1] + cells[1]) * lengths[2] + cells[2]
-        return _polynomial(table[row], *local)
+        return evaluated(self.axes, u, moves)
 
     @override
     def bind(self, points: Points) -> AbstractBinding:
         if not is_concrete(points):
             return DefinedBinding(self, points)
-        return LatticeBinding(Embedding(self, np.asarray(points)))
+        points = np.asarray(points)
+        index = np.arange(self.size // 3).reshape(self.shape)
+        part = Part(self.axes, index, (points - self.origin) @ self.inverse, None)
+
+        def field(moves: Array) -> Array:
+            return self.field(points, moves.reshape(*self.shape, 3))
+
+        return EmbeddedBinding(self, Embedding(points, [part], self.size // 3, field))
 
     @override
     def follow(self, points: Points, controls: Vector) -> Points:
         return self.following(points, self.moves(controls))[0]
 
+    @override
     def tears(self, points: Points, edges: Array, controls: Vector) -> tuple[Array, Array]:
         """Where a mesh is torn by a box whose outside stays: places (t, 3) and gaps (t,) [m].
 
@@ -242,36 +259,6 @@ class Lattice(AbstractDeformer):
         places = points[start] + (1 - 1e-9) * share[:, None] * (points[end] - points[start])
         gaps = np.asarray(self(places, jnp.asarray(controls))) - places
         return places, np.linalg.norm(gaps, axis=1)
-
-
-class LatticeBinding(AbstractBinding):
-    """A lattice on fixed points: sorted by cell once, one pass per deformation."""
-
-    embedding: Embedding = eqx.field(static=True)
-
-    @override
-    def __call__(self, controls: Vector) -> Points:
-        return self.embedding.move(self.embedding.lattice.moves(controls))[0]
-
-    def jacobian(self) -> scipy.sparse.csr_array:
-        """Derivative of all coordinates by all controls, sparse, shape (3n, 3 nu nv nw)."""
-        return scipy.sparse.csr_array(scipy.sparse.kron(self.embedding.matrix(), np.eye(3)))
-
-
-def _located(axis: bspline.Axis, u: Array) -> tuple[Array, Array]:
-    cell = jnp.searchsorted(axis.starts, jax.lax.stop_gradient(u), side="right") - 1
-    return cell, (u - jnp.asarray(axis.offsets)[cell]) * jnp.asarray(axis.scales)[cell]
-
-
-def _polynomial(c: Array, x: Array, y: Array, z: Array) -> Array:
-    """Nested Horner scheme; c has the shape (n, 3, P, Q, R)."""
-    for t in (z, y, x):
-        value = c[..., -1]
-        weight = t.reshape(-1, *(1,) * (value.ndim - 1))
-        for power in range(c.shape[-1] - 2, -1, -1):
-            value = value * weight + c[..., power]
-        c = value
-    return c
 
 
 def _frozen(

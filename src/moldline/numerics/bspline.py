@@ -41,6 +41,12 @@ class Axis(NamedTuple):
         """Coefficients of each polynomial: its degree plus one."""
         return self.powers.shape[1]
 
+    def samples(self, most: int, per_cell: int = 4) -> np.ndarray:
+        """Places from 0 to 1, some in each cell."""
+        if self.size == 1:
+            return self.rest
+        return np.linspace(0, 1, min(most, per_cell * (len(self.starts) - 2) + 1))
+
 
 def clamped(
     count: int, degree: int, outside: str, interior: tuple[float, ...] | None = None

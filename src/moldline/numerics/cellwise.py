@@ -9,6 +9,7 @@ incoming vectors. Points that move are found and evaluated one by one.
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 
 from . import cellwise_loops as loops
 from .bspline import Axis
@@ -77,10 +78,32 @@ def located(axis: Axis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return cell, (u - axis.offsets[cell]) * axis.scales[cell]
 
 
-class Blocks(NamedTuple):
-    """Points sorted by cell, in blocks of one size; places that nothing fills have order -1.
+def matrix(axes: Axes, u: np.ndarray) -> scipy.sparse.csr_array:
+    """Weight of each control point at each point, shape (n, nu nv nw)."""
+    (iu, wu), (iv, wv), (iw, ww) = (_taps(axis, u[:, i]) for i, axis in enumerate(axes))
+    nu, nv, nw = (axis.size for axis in axes)
+    column = (iu[:, :, None, None] * nv + iv[:, None, :, None]) * nw + iw[:, None, None, :]
+    value = wu[:, :, None, None] * wv[:, None, :, None] * ww[:, None, None, :]
+    row = np.broadcast_to(np.arange(len(u))[:, None, None, None], column.shape)
+    entries = (value.ravel(), (row.ravel(), column.ravel()))
+    found = scipy.sparse.coo_array(entries, (len(u), nu * nv * nw)).tocsr()
+    found.eliminate_zeros()
+    return found
 
-    `cells` counts among the cells that hold points, whose numbers are `used`.
+
+def _taps(axis: Axis, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The few control points that act on each coordinate along one axis, and their weights."""
+    cell, t = located(axis, u)
+    first, near = _acting(axis)
+    index = first[cell, None] + np.arange(near.shape[2])
+    return index, np.einsum("na,nak->nk", t[:, None] ** np.arange(near.shape[1]), near[cell])
+
+
+class Blocks(NamedTuple):
+    """Points sorted by cell, in blocks of one size.
+
+    `order` holds the points' rows, -1 in places that nothing fills. `cells` counts among the cells
+    that hold points, whose numbers are `used`.
     """
 
     x: np.ndarray
@@ -89,11 +112,10 @@ class Blocks(NamedTuple):
     order: np.ndarray
     cells: np.ndarray
     used: np.ndarray
-    length: int
 
 
-def blocks(axes: Axes, u: np.ndarray) -> Blocks:
-    """Sort points, given by box coordinates (n, 3), into blocks."""
+def blocks(axes: Axes, u: np.ndarray, rows: np.ndarray | None = None) -> Blocks:
+    """Sort points, given by box coordinates (n, 3), into blocks; `rows` numbers them otherwise."""
     found = [located(axis, u[:, i]) for i, axis in enumerate(axes)]
     shape = tuple(len(axis.starts) for axis in axes)
     key = np.ravel_multi_index([cell for cell, _ in found], shape).astype(np.int32)
@@ -102,20 +124,19 @@ def blocks(axes: Axes, u: np.ndarray) -> Blocks:
     size = _block_size(len(u), len(used))
     needed = -(-inside // size)
     place = np.arange(len(u)) + np.repeat(size * (np.cumsum(needed) - needed) - first, inside)
-    rows = int(needed.sum())
-    sorted_order = np.full(rows * size, -1, np.int32)
-    sorted_order[place] = order
-    local = np.zeros((3, rows * size))
+    count = int(needed.sum())
+    sorted_order = np.full(count * size, -1, np.int32)
+    sorted_order[place] = order if rows is None else rows[order]
+    local = np.zeros((3, count * size))
     for i, (_, t) in enumerate(found):
         local[i, place] = t[order]
     return Blocks(
-        x=local[0].reshape(rows, size),
-        y=local[1].reshape(rows, size),
-        z=local[2].reshape(rows, size),
-        order=sorted_order.reshape(rows, size),
+        x=local[0].reshape(count, size),
+        y=local[1].reshape(count, size),
+        z=local[2].reshape(count, size),
+        order=sorted_order.reshape(count, size),
         cells=np.repeat(np.arange(len(used), dtype=np.int32), needed),
         used=used.astype(np.int64),
-        length=len(u),
     )
 
 
@@ -126,15 +147,13 @@ def _block_size(points: int, cells: int) -> int:
 
 
 def displaced(
-    b: Blocks, weights: Weights, moves: np.ndarray, rest: np.ndarray | None
-) -> np.ndarray:
-    """Displacements of the blocks' points in their own order, added to `rest` where given."""
-    out = empty((b.length, 3))
+    b: Blocks, weights: Weights, moves: np.ndarray, rest: np.ndarray | None, out: np.ndarray
+) -> None:
+    """Displacements of the blocks' points, plus `rest` where given, into their rows of `out`."""
     table = coefficients(weights, b.used, moves)
     base = np.empty((0, 3)) if rest is None else rest
     least = THREAD_WORTH // b.x.shape[1]
     spread(loops.forward, len(b.cells), weights.terms, *b[:5], table, base, out, least=least)
-    return out
 
 
 def pulled_back(b: Blocks, weights: Weights, vectors: np.ndarray) -> np.ndarray:

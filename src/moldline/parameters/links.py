@@ -1,7 +1,8 @@
 """The usual links: single controls, groups, thickness, camber, radius, mirrored pairs.
 
-A lattice's axes are named x, y, z along its own edges. All displacements are in metres. A station
-is a row of control points across an axis; those that the lattice freezes get no number.
+The axes x, y, z of a lattice run along its own edges, those of other nets of control points are
+space's. All displacements are in metres. A station is a row of control points across an axis; those
+that are frozen get no number.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,7 +12,8 @@ import numpy as np
 
 from .._types import Array
 from ..deformers.base import AbstractDeformer
-from ..deformers.lattice import AXES, Lattice
+from ..deformers.lattice import Lattice
+from ..deformers.net import AXES, AbstractControlNet
 from ..errors import ParameterError
 from .link import Across, Link
 
@@ -27,25 +29,26 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
     return Link(matrix)
 
 
-def each(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
+def each(net: AbstractControlNet, axis: AxisName, **where: Any) -> Link:
     """One number for each chosen control point: its displacement along an axis.
 
     `where` is as for `group`; without it all control points that are not frozen are chosen, in the
     order of their array.
     """
-    chosen = chosen_controls(lattice, **where)
-    motion = np.zeros((lattice.size // 3, 3, len(chosen)))
-    motion[chosen, :, range(len(chosen))] = lattice.direction(axis)
-    return Link(motion.reshape(lattice.size, -1))
+    chosen = chosen_controls(net, **where)
+    motion = np.zeros((net.size // 3, 3, len(chosen)))
+    motion[chosen, :, range(len(chosen))] = net.direction(axis)
+    return Link(motion.reshape(net.size, -1))
 
 
-def group(lattice: Lattice, axis: AxisName, **where: Any) -> Link:
+def group(net: AbstractControlNet, axis: AxisName, **where: Any) -> Link:
     """One number moves all chosen control points together along an axis.
 
-    Choose by one of: `index`, a list of (i, j, k); `inside`, two opposite corners of a box in
+    Choose by one of: `index`, a list of (i, j, k), behind the number of the box where a control
+    volume has several; `inside`, two opposite corners of a box in
     space; `near` and `radius`, a point in space and a distance [m].
     """
-    return Link(each(lattice, axis, **where).matrix.sum(axis=1, keepdims=True))
+    return Link(each(net, axis, **where).matrix.sum(axis=1, keepdims=True))
 
 
 def camber(lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName) -> Link:
@@ -75,48 +78,49 @@ def radius(lattice: Lattice, along: AxisName) -> Link:
     return Link(_by_station(lattice, (along,), outward))
 
 
-def mirrored(lattice: Lattice, link: Link, across: Across) -> Link:
+def mirrored(net: AbstractControlNet, link: Link, across: Across) -> Link:
     """The same, with the half on the positive side of a plane of symmetry copied to the other.
 
-    `across` names the coordinate of space that is 0 on the plane; the lattice must be symmetric
-    about it, or have its border on it. Controls on the plane move only within it, and points on
-    it stay there to the bit.
+    `across` names the coordinate of space that is 0 on the plane; the control points must be
+    symmetric about it, or end on it. Those on the plane move only within it, and points on it stay
+    there to the bit.
     """
     axis = AXES[across]
-    places = lattice.rest.reshape(-1, 3)
-    scale = np.abs(lattice.edges).sum()
+    places = net.rest.reshape(-1, 3)
+    scale = float(np.ptp(places, axis=0).sum())
     flip = np.where(np.arange(3) == axis, -1.0, 1.0)
     gaps = np.abs(places[:, None] * flip - places).sum(axis=2)
     partner = gaps.argmin(axis=1)
     one_sided = places[:, axis].min() >= -1e-9 * scale
     if not one_sided and gaps.min(axis=1).max() > 1e-9 * scale:
         raise ParameterError(
-            f"a lattice from {across} = {places[:, axis].min():g} to {places[:, axis].max():g} is "
-            f"not symmetric about {across} = 0; make it so, or begin it there"
+            f"control points from {across} = {places[:, axis].min():g} to "
+            f"{places[:, axis].max():g} are not symmetric about {across} = 0; make them so, or "
+            "begin them there"
         )
     motion = np.array(link.matrix).reshape(-1, 3, link.size)
     lower = places[:, axis] < -1e-9 * scale
     motion[lower] = motion[partner[lower]] * flip[:, None]
     motion[np.abs(places[:, axis]) <= 1e-9 * scale, axis] = 0.0
-    both = Link(motion.reshape(lattice.size, -1), across)
-    _check_plane_kept(lattice, both, across)
+    both = Link(motion.reshape(net.size, -1), across)
+    _check_plane_kept(net, both, across)
     return both
 
 
-def _check_plane_kept(lattice: Lattice, link: Link, across: Across) -> None:
+def _check_plane_kept(net: AbstractControlNet, link: Link, across: Across) -> None:
     """Refuse a link that would really move points off the plane, tried on a sample of them."""
     rng = np.random.default_rng(0)
-    reach = np.abs(lattice.edges).sum(axis=0)
-    middle = lattice.origin + lattice.edges.sum(axis=0) / 2
-    places = middle + rng.uniform(-1, 1, (200, 3)) * reach  # twice as large as the box
+    rest = net.rest.reshape(-1, 3)
+    low, reach = rest.min(axis=0), np.ptp(rest, axis=0)
+    places = low + rng.uniform(-0.5, 1.5, (200, 3)) * reach  # twice as large as the net
     places[:, AXES[across]] = 0.0
     controls = link.matrix @ rng.uniform(-1, 1, link.size)
-    moved = np.asarray(lattice.bind(places)(controls))
+    moved = np.asarray(net.follow(places, controls))
     off = np.abs(moved[:, AXES[across]]).max() / max(np.abs(controls).max(), 1e-300)
     if off > 1e-9:
         raise ParameterError(
-            f"this lattice moves points at {across} = 0 off that plane, by {off:.2g} of its "
-            f"controls' motion; make it symmetric about {across} = 0, or begin it there with "
+            f"these control points move points at {across} = 0 off that plane, by {off:.2g} of its "
+            f"controls' motion; make them symmetric about {across} = 0, or begin them there with "
             f"clamped ends"
         )
 
@@ -148,31 +152,28 @@ def _by_station(lattice: Lattice, along: tuple[str, ...], motion: Array) -> np.n
 
 
 def chosen_controls(
-    lattice: Lattice,
+    net: AbstractControlNet,
     index: Sequence[Sequence[int]] | None = None,
     inside: Sequence[Sequence[float]] | None = None,
     near: Sequence[float] | None = None,
     radius: float | None = None,
 ) -> np.ndarray:
     """Numbers of the chosen control points."""
-    places = lattice.rest.reshape(-1, 3)
+    places = net.rest.reshape(-1, 3)
     if (near is None) != (radius is None) or sum(x is not None for x in (index, inside, near)) > 1:
         raise ParameterError("choose control points by index, by inside, or by near with radius")
     if index is not None:
-        rows = np.asarray(index, int).reshape(-1, 3)
-        if np.any((rows < 0) | (rows >= lattice.shape)):
-            raise ParameterError(f"index {rows.tolist()} leaves a lattice of {lattice.shape}")
-        return np.ravel_multi_index(tuple(rows.T), lattice.shape)
+        return net.numbers(index)
     if inside is not None:
         low, high = np.sort(np.asarray(inside, float), axis=0)
         chosen = np.flatnonzero(np.all((places >= low) & (places <= high), axis=1))
     elif near is not None:
         chosen = np.flatnonzero(np.linalg.norm(places - np.asarray(near), axis=1) <= radius)
     else:
-        return np.flatnonzero(~lattice.frozen.ravel())
+        return np.flatnonzero(~net.frozen.ravel())
     if len(chosen) == 0:
         raise ParameterError(
-            f"no control point there; the lattice reaches from {places.min(axis=0).tolist()} "
+            f"no control point there; they reach from {places.min(axis=0).tolist()} "
             f"to {places.max(axis=0).tolist()}"
         )
     return chosen

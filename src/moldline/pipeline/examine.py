@@ -1,7 +1,6 @@
 """Is this deformation sound: does space fold over, does the mesh tear, are derivatives right?"""
 
 from dataclasses import dataclass
-from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -9,16 +8,14 @@ import numpy as np
 from .._types import Array
 from ..deformers.base import map_slopes
 from ..deformers.foreign import AbstractNumpyDeformer
-from ..deformers.lattice import Lattice
+from ..deformers.net import AbstractControlNet
 from ..mesh import Surface, VolumeMesh, quality
 from ..mesh.joined import joined_points
 from ..numerics.taylor import Remainder, remainder
 from .pipeline import Pipeline, Values
 
-SAMPLES = 4
-"""Samples per cell and axis where a lattice's box is searched for folds."""
-
 MOST_SAMPLES = 200_000
+"""Places in the box of a lattice or control volume that are searched for folds."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +25,7 @@ class Folding:
     Attributes
     ----------
     smallest
-        Over the geometry's points and a grid of samples in every lattice's box.
+        Over the geometry's points and a grid of samples in every stage's box.
     place
         Where that is, before the deformation [m].
     at_points
@@ -93,15 +90,20 @@ class Proof:
 def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
     """Search a deformation for folds, at samples; a small fold between them is not seen."""
     points = np.asarray(pipeline.geometry.points)
-    boxes = [_samples(stage.deformer) for stage in pipeline.own_stages]
-    places = np.concatenate([points, *boxes])
+    nets = [stage.deformer for stage in pipeline.own_stages]
+    samples = [net.samples(MOST_SAMPLES) for net in nets if isinstance(net, AbstractControlNet)]
+    places = np.concatenate([points, *samples])
     slopes: np.ndarray = np.broadcast_to(np.eye(3), (len(places), 3, 3))
-    present: Array = jnp.asarray(places)
+    rest: Array = jnp.asarray(places)
+    present: Array = rest
     full = pipeline.values(values)
     for stage in pipeline.own_stages:
         controls = stage.controls(full)
-        slopes = np.asarray(map_slopes(stage.deformer, present, controls)) @ slopes
-        present = stage.deformer.follow(present, controls)
+        if stage.carried:
+            slopes = slopes + np.asarray(map_slopes(stage.deformer, rest, controls)) - np.eye(3)
+        else:
+            slopes = np.asarray(map_slopes(stage.deformer, present, controls)) @ slopes
+        present = stage.after(rest, present, controls)
     determinants = np.linalg.det(slopes)
     worst = int(determinants.argmin())
     return Folding(
@@ -112,37 +114,25 @@ def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
     )
 
 
-def _samples(deformer: Any) -> np.ndarray:
-    """A grid of places in a lattice's box, none elsewhere."""
-    if not isinstance(deformer, Lattice):
-        return np.empty((0, 3))
-    most = int(MOST_SAMPLES ** (1 / 3))
-    lines = [
-        np.linspace(0, 1, min(most, SAMPLES * (len(axis.starts) - 2) + 1)) if axis.size > 1
-        else np.array([0.5])
-        for axis in deformer.axes
-    ]  # fmt: skip
-    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 3)
-    return deformer.origin + grid @ deformer.edges
-
-
 def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
     """Stages that tear the mesh where it leaves their boxes."""
     edges = joined_points(pipeline.geometry)
     found = []
     full = pipeline.values(values)
-    present = np.asarray(pipeline.geometry.points)
-    size = float(np.ptp(present, axis=0).max())
+    rest = np.asarray(pipeline.geometry.points)
+    present = rest
+    size = float(np.ptp(rest, axis=0).max())
     for stage in pipeline.own_stages:
         controls = stage.controls(full)
-        if isinstance(stage.deformer, Lattice):
-            places, gaps = stage.deformer.tears(present, edges, controls)
+        if isinstance(stage.deformer, AbstractControlNet):
+            bound = rest if stage.carried else present
+            places, gaps = stage.deformer.tears(bound, edges, controls)
             torn = np.flatnonzero(gaps > 1e-9 * size)
             if len(torn):
                 widest = int(gaps.argmax())
                 tear = Tear(stage.name, len(torn), float(gaps[widest]), _place(places[widest]))
                 found.append(tear)
-        present = np.asarray(stage.deformer.follow(present, controls))
+        present = np.asarray(stage.after(rest, present, controls))
     return found
 
 

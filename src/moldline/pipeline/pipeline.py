@@ -37,14 +37,15 @@ class Pipeline(eqx.Module):
     result
         Which geometry the pipeline gives back.
     bindings
-        For each geometry the first stage on it, tied to its points.
+        For each geometry the first stage on it and the carried ones, tied to its points, by their
+        place among its stages.
     """
 
     geometries: dict[str, Geometry]
     stages: tuple[Stage, ...]
     variables: dict[str, Variable] = eqx.field(static=True)
     result: str = eqx.field(static=True)
-    bindings: dict[str, AbstractBinding]
+    bindings: dict[str, dict[int, AbstractBinding]]
 
     def __init__(
         self,
@@ -60,9 +61,12 @@ class Pipeline(eqx.Module):
         self.result = result or bases[-1]
         _check_name(self.result, self.geometries)
         self.bindings = {
-            name: self._on(name)[0].deformer.bind(geometry.points)
+            name: {
+                number: stage.bind(name, geometry.points)
+                for number, stage in enumerate(self._on(name))
+                if number == 0 or stage.carried
+            }
             for name, geometry in self.geometries.items()
-            if self._on(name)
         }
 
     def __call__(self, values: Values | None = None) -> Geometry:
@@ -90,12 +94,14 @@ class Pipeline(eqx.Module):
             if stage.settles:
                 controls = stage.deformer.settle(state[base], controls)
             for name in needed:
-                moved = (
-                    self.bindings[name](controls)
-                    if number == 0
-                    else stage.deformer.follow(state[name], controls)
-                )
-                state[name] = stage.held(self.geometries[name].points, moved)
+                rest = self.geometries[name].points
+                if number not in self.bindings[name]:
+                    moved = stage.deformer.follow(state[name], controls)
+                else:
+                    moved = self.bindings[name][number](controls)
+                    if number > 0:
+                        moved = state[name] + (moved - rest)
+                state[name] = stage.held(rest, moved)
         return state[self.result]
 
     def pushforward(self, values: Values | None, directions: Values) -> Points:
@@ -183,7 +189,7 @@ def _placed(stages: Sequence[Stage], bases: list[str]) -> Iterable[Stage]:
             )
         on = stage.on or bases[0]
         _check_name(on, bases)
-        yield Stage(stage.deformer, stage.links, on, stage.name)
+        yield Stage(stage.deformer, stage.links, on, stage.name, stage.carried)
 
 
 def _collected(stages: Iterable[Stage]) -> dict[str, Variable]:

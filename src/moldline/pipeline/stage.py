@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from .._types import Array, Points, Vector
-from ..deformers.base import AbstractDeformer
-from ..errors import ParameterError
+from ..deformers.base import AbstractBinding, AbstractDeformer
+from ..errors import GeometryError, ParameterError
 from ..parameters.link import Across, Link
 from ..parameters.variable import Variable
 
@@ -26,12 +26,16 @@ class Stage(eqx.Module):
         Name of the geometry that it acts on; "" is the only one of a pipeline.
     name
         What reports call it.
+    carried
+        Whether the stages before it carry it along, as a child box is by its parent: its points are
+        bound where they are at rest, and its displacements add to what those stages do.
     """
 
     deformer: AbstractDeformer
     links: dict[Variable, Link]
     on: str = eqx.field(static=True)
     name: str = eqx.field(static=True)
+    carried: bool = eqx.field(static=True)
 
     def __init__(
         self,
@@ -39,11 +43,13 @@ class Stage(eqx.Module):
         links: Mapping[Variable, Link],
         on: str = "",
         name: str = "",
+        carried: bool = False,
     ):
         self.deformer = deformer
         self.links = dict(links)
         self.on = on
         self.name = name or type(deformer).__name__.lower()
+        self.carried = carried
 
     def __check_init__(self) -> None:
         for variable, link in self.links.items():
@@ -77,6 +83,19 @@ class Stage(eqx.Module):
         for variable, link in self.links.items():
             total = total + link.matrix @ (values[variable.name] * variable.factor)
         return total
+
+    def bind(self, geometry: str, points: Points) -> AbstractBinding:
+        """The deformer tied to the points of a geometry, whose name an error gives."""
+        try:
+            return self.deformer.bind(points)
+        except GeometryError as error:
+            raise GeometryError(f"stage {self.name!r} on {geometry!r}: {error}") from None
+
+    def after(self, rest: Points, present: Points, controls: Vector) -> Points:
+        """Where it takes points that are not bound, from where they are at rest and at present."""
+        if self.carried:
+            return present + (self.deformer.follow(rest, controls) - rest)
+        return self.deformer.follow(present, controls)
 
     def held(self, rest: Points, moved: Points) -> Points:
         """Points on the plane of symmetry put back on it, which only undoes rounding."""

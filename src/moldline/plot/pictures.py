@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from ..deformers.lattice import Lattice
+from ..deformers.net import AbstractControlNet
 from ..errors import ParameterError
 from ..mesh import Cloud, Geometry, Section, VolumeMesh
 from ..mesh.joined import joined_points
 from ..pipeline.pipeline import Pipeline, Values
+from ..pipeline.stage import Stage
 from .figure import blank
 from .sections import draw_section, section_picture
 from .surfaces import before_and_after, draw_edges, draw_lattice, draw_surface, sensitivity_map
@@ -101,29 +102,45 @@ def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
 
 
 def lattices(pipeline: Pipeline, values: Values | None = None) -> list[tuple[Any, Any]]:
-    """Control points of each lattice of a pipeline, at rest and moved, shape (nu, nv, nw, 3)."""
+    """Grids of control points of a pipeline, at rest and moved, shape (nu, nv, nw, 3)."""
     full = pipeline.values(values)
-    return [
-        (stage.deformer.rest, np.asarray(stage.deformer.moved(stage.controls(full))))
-        for stage in pipeline.own_stages
-        if isinstance(stage.deformer, Lattice)
-    ]
+    found: list[tuple[Any, Any]] = []
+    for stage, net in _nets(pipeline):
+        rest = net.rest.reshape(-1, 3)
+        place = _carried(pipeline, stage, rest, full) if stage.carried else rest
+        moved = place + np.asarray(net.moves(stage.controls(full))).reshape(-1, 3)
+        found += zip(net.grids(rest), net.grids(moved), strict=True)
+    return found
+
+
+def _carried(pipeline: Pipeline, last: Stage, rest: np.ndarray, values: Values) -> np.ndarray:
+    """Where the stages before a carried one take its control points."""
+    place = rest
+    for stage in pipeline.own_stages:
+        if stage is last:
+            break
+        place = np.asarray(stage.after(rest, place, stage.controls(values)))
+    return place
+
+
+def _nets(pipeline: Pipeline) -> list[tuple[Stage, AbstractControlNet]]:
+    stages = pipeline.own_stages
+    return [(s, s.deformer) for s in stages if isinstance(s.deformer, AbstractControlNet)]
 
 
 def _highlighted(
     pipeline: Pipeline, direction: dict[str, np.ndarray]
 ) -> list[tuple[int, np.ndarray]]:
-    """Of each lattice the control points that a number moves."""
+    """Of each grid the control points that a number moves."""
     found: list[tuple[int, np.ndarray]] = []
-    for stage in pipeline.own_stages:
-        if not isinstance(stage.deformer, Lattice):
-            continue
-        moves = np.zeros(stage.deformer.size)
+    for stage, net in _nets(pipeline):
+        moves = np.zeros(net.size)
         for variable, link in stage.links.items():
             if variable.name in direction:
                 moves = moves + np.asarray(link.matrix) @ direction[variable.name]
-        free = np.asarray(stage.deformer.moves(moves))
-        found.append((len(found), np.argwhere(np.any(free != 0, axis=-1))))
+        free = np.asarray(net.moves(moves)).reshape(-1, 3)
+        for grid in net.grids(free):
+            found.append((len(found), np.argwhere(np.any(grid != 0, axis=-1))))
     return found
 
 

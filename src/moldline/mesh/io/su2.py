@@ -49,16 +49,16 @@ def sniff(head: bytes, path: Path | str) -> bool:
 
 def read(path: Path | str) -> VolumeMesh:
     """The mesh in a file."""
-    sections = list(_sections(text.unix(contents(path)), path))
-    mesh = _by_keyword(sections, path)
-    dimension = _count(mesh["NDIME"], path)
+    found = list(sections(text.unix(contents(path)), path))
+    mesh = _by_keyword(found, path)
+    dimension = whole(mesh["NDIME"], path)
     if dimension not in (2, 3):
         raise FileError(f"{path}: line {mesh['NDIME'].line}: NDIME= {dimension}, expected 2 or 3")
     points = _points(mesh["NPOIN"], dimension, path)
     cells = _cells(mesh["NELEM"], len(points), path)
-    markers = _markers(sections, mesh.get("NMARK"), len(points), path)
+    markers = _markers(found, mesh.get("NMARK"), len(points), path)
     known = _SINGLE | _REPEATED
-    extra = b"".join(section.verbatim for section in sections if section.keyword not in known)
+    extra = b"".join(section.verbatim for section in found if section.keyword not in known)
     return VolumeMesh(points, cells, markers, dimension, extra.decode("latin-1"))
 
 
@@ -80,12 +80,12 @@ def write(path: Path | str, mesh: VolumeMesh) -> None:
         file.write(mesh.extra.encode("latin-1"))
 
 
-def _sections(data: bytes, path: Path | str) -> Iterator[Section]:
+def sections(data: bytes, path: Path | str) -> Iterator[Section]:
     found = list(_KEYWORD.finditer(data))
     before = _COMMENT.sub(b"", data[: found[0].start()] if found else data).split()
     if before or not found:
-        word = text.decoded(before[0]) if before else "nothing"
-        raise FileError(f"{path}: found {word!r}, expected a keyword such as 'NDIME=' first")
+        word = text.quoted(before[0] if before else "nothing")
+        raise FileError(f"{path}: found {word}, expected a keyword such as 'NDIME=' first")
     line, at = 1, 0
     for match, following in zip(found, [*found[1:], None], strict=True):
         end = following.start() if following else len(data)
@@ -114,20 +114,18 @@ def _by_keyword(sections: list[Section], path: Path | str) -> dict[str, Section]
     return found
 
 
-def _count(section: Section, path: Path | str) -> int:
+def whole(section: Section, path: Path | str) -> int:
     """The whole number behind a keyword; others may follow it."""
     words = section.value.split()
     if not words or not words[0].isdigit() or len(words[0]) > 10:
-        raise FileError(
-            f"{path}: line {section.line}: found '{section.keyword}= "
-            f"{text.decoded(section.value)}', expected a whole number"
-        )
+        found = text.quoted(f"{section.keyword}= {text.decoded(section.value)}")
+        raise FileError(f"{path}: line {section.line}: found {found}, expected a whole number")
     return int(words[0])
 
 
-def _table(section: Section, path: Path | str) -> text.Rows:
+def table(section: Section, path: Path | str) -> text.Rows:
     """As many rows as the keyword promises."""
-    count = _count(section, path)
+    count = whole(section, path)
     rows = text.rows(section.body, path, section.line)
     if len(rows.lines) != count:
         raise FileError(
@@ -138,7 +136,7 @@ def _table(section: Section, path: Path | str) -> text.Rows:
 
 
 def _points(section: Section, dimension: int, path: Path | str) -> np.ndarray:
-    rows = _table(section, path)
+    rows = table(section, path)
     width = np.diff(rows.starts)
     bad = np.flatnonzero((width < dimension) | (width > dimension + 2))
     if len(bad):
@@ -152,7 +150,7 @@ def _points(section: Section, dimension: int, path: Path | str) -> np.ndarray:
 
 
 def _cells(section: Section, count: int, path: Path | str) -> Cells:
-    rows = _table(section, path)
+    rows = table(section, path)
     width = np.diff(rows.starts)
     types = rows.values[rows.starts[:-1]]
     sizes = np.zeros(len(types), np.int64)
@@ -182,15 +180,15 @@ def _markers(
         if section.keyword == "MARKER_TAG":
             name = text.decoded(section.value)
             if name in markers:
-                raise FileError(f"{path}: line {section.line}: a second marker named {name!r}")
+                raise FileError(f"{path}: line {section.line}: a second marker {text.quoted(name)}")
         elif section.keyword == "MARKER_ELEMS":
             if name is None:
                 raise FileError(f"{path}: line {section.line}: MARKER_ELEMS= without MARKER_TAG=")
             markers[name] = _cells(section, count, path)
             name = None
-    if promised and _count(promised, path) != len(markers):
+    if promised and whole(promised, path) != len(markers):
         raise FileError(
-            f"{path}: line {promised.line}: NMARK= {_count(promised, path)}, but {len(markers)} "
+            f"{path}: line {promised.line}: NMARK= {whole(promised, path)}, but {len(markers)} "
             "markers follow; was the copy cut short?"
         )
     return markers

@@ -75,7 +75,8 @@ def _deformation(
 
     from ..pipeline import examine
 
-    fold, torn, turned, inverted, proof = in_steps(
+    embedded, fold, torn, turned, inverted, proof = in_steps(
+        embedding=lambda: examine.embedded(pipeline),
         folds=lambda: examine.folding(pipeline, chosen),
         tears=lambda: examine.tears(pipeline, chosen),
         turned_faces=lambda: examine.turned_faces(pipeline, chosen),
@@ -87,6 +88,7 @@ def _deformation(
         f"order {proof.forward.order:.3f} of the Taylor remainder (2 is right)"
     )  # fmt: skip
     lines = [
+        *(f"embedding    {one}" for one in embedded),
         f"deformation  smallest Jacobian determinant {fold.smallest:.4g} at "
         f"({x:.4g}, {y:.4g}, {z:.4g}), {fold.at_points:.4g} on the mesh; "
         f"{fold.samples} places looked at",
@@ -97,6 +99,7 @@ def _deformation(
         f"derivatives  {proof.method}: {order}; forward and reverse differ by {proof.mismatch:.1e}",
     ]
     report = {
+        "embedding": [{**vars(one), "outside": one.outside.tolist()} for one in embedded],
         "folding": {**asdict(fold), "folds": fold.folds},
         "turned_faces": [int(face) for face in turned[:10]],
         "inverted_cells": [int(cell) for cell in inverted[:10]],

@@ -51,6 +51,22 @@ def group(net: AbstractControlNet, axis: AxisName, **where: Any) -> Link:
     return Link(each(net, axis, **where).matrix.sum(axis=1, keepdims=True))
 
 
+def groups(
+    net: AbstractControlNet,
+    direction: Sequence[float],
+    index: Sequence[Sequence[Sequence[int]]],
+) -> Link:
+    """One number for each list of control points: all in it move together along a direction.
+
+    `index` holds lists of indices as `group` takes one; `direction` is the motion in space for a
+    number of 1.
+    """
+    motion = np.zeros((net.size // 3, 3, len(index)))
+    for column, rows in enumerate(index):
+        motion[net.numbers(rows), :, column] = np.asarray(direction, float)
+    return Link(motion.reshape(net.size, -1))
+
+
 def camber(lattice: Lattice, along: AxisName | Sequence[AxisName], axis: AxisName) -> Link:
     """At each station along one axis (or two), all controls move together along another."""
     return _stations(lattice, along, axis, np.ones(lattice.shape[AXES[axis]]))
@@ -189,6 +205,7 @@ LINKS: dict[str, Callable[..., Link]] = {
     "controls": controls,
     "each": each,
     "group": group,
+    "groups": groups,
     "camber": camber,
     "thickness": thickness,
     "radius": radius,

@@ -7,6 +7,7 @@ import numpy as np
 
 from .._types import Array
 from ..deformers.base import map_slopes
+from ..deformers.control_volume import ControlVolume
 from ..deformers.foreign import AbstractNumpyDeformer
 from ..deformers.net import AbstractControlNet
 from ..mesh import Surface, VolumeMesh, quality
@@ -60,6 +61,38 @@ class Tear:
             f"stage {self.stage!r} tears the mesh: {self.edges} edges leave its box where it "
             f"moves, by up to {self.widest:.3g} near ({x:.4g}, {y:.4g}, {z:.4g}); freeze that "
             f'side, enlarge the box or let outside = "extend"'
+        )
+
+
+@dataclass(frozen=True)
+class Embedded:
+    """How well a control volume found the points that it is bound to.
+
+    Attributes
+    ----------
+    residual
+        The largest distance from a point to where its box coordinates lie [m].
+    most_steps, mean_steps
+        Newton's steps for one point.
+    outside
+        Points in no box, which stay.
+    """
+
+    stage: str
+    points: int
+    boxes: int
+    residual: float
+    most_steps: int
+    mean_steps: float
+    outside: np.ndarray
+
+    def __str__(self) -> str:
+        lost = f"; {len(self.outside)} points lie outside and stay" if len(self.outside) else ""
+        first = f", the first is {self.outside[0]}" if len(self.outside) else ""
+        return (
+            f"stage {self.stage!r}: {self.points - len(self.outside)} points in {self.boxes} "
+            f"box{'es' if self.boxes > 1 else ''}, residual at most {self.residual:.1e}, "
+            f"{self.most_steps} Newton steps at most, {self.mean_steps:.1f} on average{lost}{first}"
         )
 
 
@@ -133,6 +166,28 @@ def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
                 tear = Tear(stage.name, len(torn), float(gaps[widest]), _place(places[widest]))
                 found.append(tear)
         present = np.asarray(stage.after(rest, present, controls))
+    return found
+
+
+def embedded(pipeline: Pipeline) -> list[Embedded]:
+    """How well control volumes found the geometry's points."""
+    points = pipeline.geometry.points
+    found = []
+    for number, stage in enumerate(pipeline.own_stages):
+        if isinstance(stage.deformer, ControlVolume) and (number == 0 or stage.carried):
+            places = stage.deformer.embedded(points)
+            inside = places.volume >= 0
+            found.append(
+                Embedded(
+                    stage.name,
+                    len(points),
+                    len(stage.deformer.frame.boxes),
+                    float(places.miss[inside].max(initial=0.0)),
+                    int(places.steps[inside].max(initial=0)),
+                    float(places.steps[inside].mean()) if inside.any() else 0.0,
+                    np.flatnonzero(~inside),
+                )
+            )
     return found
 
 

@@ -1,5 +1,6 @@
 """The free-form deformation boxes inside an SU2 mesh (its `FFD_BOX` blocks)."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -104,7 +105,7 @@ def _names(section: su2.Section | None) -> tuple[str, ...]:
 def _controls(section: su2.Section, counts: tuple[int, ...], path: Path | str) -> np.ndarray:
     """Control points by their indices."""
     rows = su2.table(section, path)
-    total = int(np.prod(counts))
+    total = math.prod(counts)
     if total > MOST_CONTROLS or len(rows.lines) != total:
         raise FileError(
             f"{path}: line {section.line}: {len(rows.lines)} control points, but degrees of "

@@ -10,6 +10,7 @@ import numpy as np
 import tomli_w
 
 from .. import registry
+from .._types import Points
 from ..deformers.base import AbstractDeformer
 from ..errors import CaseError, MoldlineError, ParameterError
 from ..mesh import Geometry
@@ -58,6 +59,10 @@ class Case:
         if beyond:
             raise ParameterError(f"{self.path}: " + "; ".join(beyond))
         return values
+
+    def embed(self, points: Geometry | Points, on: str = "", name: str = "embedded") -> Pipeline:
+        """The case's deformation bound to other points; see `Pipeline.embed`."""
+        return self.pipeline.embed(points, on, name)
 
     def rider(self, name: str) -> Pipeline:
         """The pipeline of one rider."""

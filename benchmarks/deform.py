@@ -40,15 +40,15 @@ def main() -> None:
     given = parser.parse_args()
     separator = " | " if given.markdown else "  "
     widths = [max(len(name), 8) for name in COLUMNS]
-    _line(COLUMNS, widths, separator, given.markdown)
+    line(COLUMNS, widths, separator, given.markdown)
     if given.markdown:
-        _line(["---:"] * len(COLUMNS), widths, separator, True)
+        line(["---:"] * len(COLUMNS), widths, separator, True)
     context = multiprocessing.get_context("spawn")
     for count in (3, 10):
         for size in given.sizes:
             with context.Pool(1) as pool:
                 row = pool.apply(measured, (size, count))
-            _line([_told(row.get(name)) for name in COLUMNS], widths, separator, given.markdown)
+            line([told(row.get(name)) for name in COLUMNS], widths, separator, given.markdown)
 
 
 def measured(size: int, count: int) -> dict[str, float | str]:
@@ -152,7 +152,7 @@ def _warm(count: int) -> None:
     jax.vjp(lattice.follow, points, controls)[1](points)
 
 
-def _told(value: float | str | None) -> str:
+def told(value: float | str | None) -> str:
     if value is None:
         return "-"
     if isinstance(value, str):
@@ -160,7 +160,7 @@ def _told(value: float | str | None) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"
 
 
-def _line(cells: object, widths: list[int], separator: str, markdown: bool) -> None:
+def line(cells: object, widths: list[int], separator: str, markdown: bool) -> None:
     text = separator.join(str(cell).rjust(w) for cell, w in zip(cells, widths, strict=True))  # type: ignore[call-overload]
     print(f"| {text} |" if markdown else text, flush=True)
 

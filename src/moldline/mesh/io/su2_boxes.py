@@ -144,7 +144,7 @@ def _embedded(
             f"three coordinates, found {len(lines)}"
         )
     body = b"\n".join(b" ".join(words[1:]) for _, words in lines)
-    values = text.numbers(body, path, section.line + 1).reshape(-1, 4)
+    values = text.rows(body, path, section.line + 1).values.reshape(-1, 4)
     nodes = text.indices(values[:, 0], 2**31 - 1, path, lambda k: f"line {lines[k][0]}", base=0)
     return tuple(text.decoded(words[0]) for _, words in lines), nodes, values[:, 1:]
 

@@ -89,3 +89,30 @@ def test_welding_undoes_the_splitting_of_a_cube(tolerance):
     assert len(kept) == 8
     np.testing.assert_array_equal(soup[kept][index], soup)
     assert topology.is_closed(index.reshape(-1, 3))
+
+
+def test_neighbours_lie_across_edges_of_two_faces_only():
+    near = topology.neighbours(CUBE)
+    assert len(near.one) == 18 and near.is_oriented.all()
+    faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4], [2, 1, 5], [2, 5, 6], [5, 7, 2]])
+    near = topology.neighbours(faces)  # 0-1 and 2-5 have three faces
+    assert [(near.one.tolist()), near.other.tolist(), near.is_oriented.tolist()] == [
+        [0],
+        [3],
+        [True],
+    ]
+
+
+def test_turns_are_told_from_the_first_face_of_each_patch():
+    faces = CUBE.copy()
+    faces[[0, 7]] = faces[[0, 7], ::-1]
+    found = topology.turns(faces)
+    assert np.flatnonzero(found.is_turned).tolist() == [1, 2, 3, 4, 5, 6, 8, 9, 10, 11]
+    assert found.is_orientable.tolist() == [True]
+    assert len(topology.turns(np.empty((0, 3), int)).patch) == 0
+
+
+def test_the_sense_of_a_face_is_that_of_its_points_in_a_circle():
+    faces = np.array([[0, 1, 2], [1, 2, 0], [2, 1, 0], [0, 2, 1], [3, 4, 5], [5, 4, 3]])
+    assert topology.duplicate_faces(faces).tolist() == [1, 2, 3, 5]
+    assert topology.back_to_back_faces(faces).tolist() == [2, 5]

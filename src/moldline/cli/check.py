@@ -1,76 +1,165 @@
 """`moldline check`."""
 
 import argparse
+import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import in_steps, show, values
 
 if TYPE_CHECKING:
-    from ..mesh import Geometry
+    from ..mesh import Geometry, Surface
+    from ..mesh.health import Health
+    from ..mesh.parts import Part
     from ..pipeline.pipeline import Pipeline
+
+MOST_PARTS = 10
+"""Components or pieces that are told one by one."""
 
 HELP = "Check a case: health of its mesh, folds and tears of its deformation, its derivatives."
 EXAMPLE = """\
   moldline check examples/transport_wing.toml
-  moldline check wing.stl                      (a geometry file: its health alone)"""
+  moldline check wing.stl                            (a geometry file: its health alone)
+  moldline check wing.stl --picture faults.png       (a picture of its faults)
+  moldline check wing.stl --fix mended.stl           (mend what can be mended without guessing)"""
 
 
 def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
     values.configure(command)
     command.add_argument("--json", action="store_true", help="report for a script")
+    command.add_argument("--picture", type=Path, metavar="FILE", help="draw the surface's faults")
+    command.add_argument("--view", default="iso", help="of the picture, as for `moldline plot`")
+    command.add_argument(
+        "--fix", type=Path, metavar="OUT", help="write the surface, mended, to another file"
+    )
+    command.add_argument(
+        "--weld",
+        type=float,
+        metavar="LENGTH",
+        help="with --fix, also join points within this distance, in the file's unit",
+    )
 
 
 def run(given: argparse.Namespace) -> int:
-    """Do it; 0 only if all is sound."""
+    """Do it; 0 only if all is sound, with `--fix` after the mending."""
     from ..case import load
+    from ..errors import ParameterError
     from ..mesh.io import read
 
+    if given.weld is not None and given.fix is None:
+        raise ParameterError("--weld belongs to --fix OUT, which says where to write")
     if given.case.suffix.lower() != ".toml":
-        report, lines, is_sound = _mesh(read(given.case))
-        show({"mesh": report, "is_sound": is_sound}, given.json, lines)
+        geometry = read(given.case)
+        report, lines, is_sound = _fixed(geometry, given) if given.fix else _mesh(geometry, given)
+        show({**report, "is_sound": is_sound}, given.json, lines)
         return 0 if is_sound else 1
+    if given.fix is not None:
+        raise ParameterError("--fix mends a geometry file, not a case; give the geometry's file")
     case = load(given.case)
     chosen = values.chosen(case, given)
-    mesh, mesh_lines, is_mesh_sound = _mesh(case.pipeline.geometry)
+    mesh, mesh_lines, is_mesh_sound = _mesh(case.pipeline.geometry, given)
     moved, moved_lines, is_moved_sound = _deformation(case.pipeline, chosen)
     is_sound = is_mesh_sound and is_moved_sound
     show(
-        {"mesh": mesh, **moved, "is_sound": is_sound},
+        {**mesh, **moved, "is_sound": is_sound},
         given.json,
         [*mesh_lines, *moved_lines, "sound" if is_sound else "NOT sound: see above"],
     )
     return 0 if is_sound else 1
 
 
-def _mesh(geometry: "Geometry") -> tuple[dict[str, Any], list[str], bool]:
+Told = tuple[dict[str, Any], list[str], bool]
+"""A report for a script, one for a person, and whether all is sound."""
+
+
+def _mesh(geometry: "Geometry", given: argparse.Namespace) -> Told:
+    from ..errors import ParameterError
     from ..mesh import Surface, VolumeMesh
     from ..mesh.health import health
     from ..mesh.quality import inverted_cells
 
-    title = f"mesh         {type(geometry).__name__.lower()} of {len(geometry.points)} points"
+    kind = type(geometry).__name__
+    title = f"mesh         {kind.lower()} of {len(geometry.points)} points"
+    if isinstance(geometry, Surface):
+        found = health(geometry)
+        drawn = _picture(geometry, found, given)
+        return {"mesh": found.as_dict()}, [title, *_facts(found), *drawn], found.is_sound
+    if given.picture is not None:
+        raise ParameterError(f"--picture draws the faults of a surface, this is a {kind}")
     if isinstance(geometry, VolumeMesh):
         bad = inverted_cells(geometry)
         line = f"  {len(bad)} inverted cells" + (f", the first is {bad[0]}" if len(bad) else "")
-        return {"inverted_cells": bad.tolist()}, [title, line], not len(bad)
+        return {"mesh": {"inverted_cells": bad.tolist()}}, [title, line], not len(bad)
+    return {"mesh": {"points": len(geometry.points)}}, [title], True
+
+
+def _fixed(geometry: "Geometry", given: argparse.Namespace) -> Told:
+    """Mend, write, and tell the health of what was written."""
+    from ..errors import ParameterError
+    from ..mesh import Surface
+    from ..mesh.io import write
+    from ..mesh.mend import mended
+
+    if given.fix.exists() and given.fix.samefile(given.case):
+        raise ParameterError(f"--fix {given.fix}: is the file that is checked; give another name")
     if not isinstance(geometry, Surface):
-        return {"points": len(geometry.points)}, [title], True
-    found = health(geometry)
-    facts = [
+        raise ParameterError(f"--fix mends a surface, this is a {type(geometry).__name__}")
+    result, mending = mended(geometry, given.weld or 0.0)
+    write(given.fix, result)
+    report, lines, is_sound = _mesh(result, given)
+    done = mending.sentences() or ["nothing to mend"]
+    told = [f"mended       {given.fix}", *(f"  {line}" for line in done)]
+    left = [f"  left: {line}" for line in mending.left()]
+    mending_report = {"file": str(given.fix), **mending.as_dict()}
+    return {"mending": mending_report, **report}, [*told, *left, *lines], is_sound
+
+
+def _picture(surface: "Surface", found: "Health", given: argparse.Namespace) -> list[str]:
+    if given.picture is None:
+        return []
+    from ..plot import of_faults, save
+
+    title = given.case.stem.replace("_", " ")
+    save(of_faults(surface, found, given.view, title), given.picture)
+    return [f"  picture: {given.picture}"]
+
+
+def _facts(found: "Health") -> list[str]:
+    """What a surface is made of, then what is wrong with it."""
+    return [
         f"  {found.faces} faces, {found.pieces} pieces, components: {', '.join(found.components)}",
         f"  {'closed' if found.is_closed else 'open'}, "
         f"{'manifold' if found.is_manifold else 'not manifold'}, "
         f"{'consistently oriented' if found.is_oriented else 'not consistently oriented'}",
-        f"  area {found.area:.6g}, volume "
-        + ("unknown" if found.volume is None else f"{found.volume:.6g}"),
+        f"  area {found.area:.6g}, volume {_volume(found.volume)}, smallest angle "
+        f"{math.degrees(found.smallest_angle):.3g} degrees",
+        *_parts("component", found.by_component),
+        *_parts("piece", found.by_piece),
+        *(f"  ! {sentence}" for sentence in found.sentences()),
+        *(f"  note: {sentence}" for sentence in found.remarks()),
     ]
-    complaints = [f"  ! {sentence}" for sentence in found.sentences()]
-    return found.as_dict(), [title, *facts, *complaints], found.is_sound
 
 
-def _deformation(
-    pipeline: "Pipeline", chosen: dict[str, Any]
-) -> tuple[dict[str, Any], list[str], bool]:
+def _parts(kind: str, parts: "tuple[Part, ...]") -> list[str]:
+    """One line for each part where there are several; of many the largest."""
+    largest = sorted(parts, key=lambda part: -part.area)[:MOST_PARTS]
+    lines = [
+        f"    {kind} {part.name}: {part.faces} faces, {'closed' if part.is_closed else 'open'}, "
+        f"area {part.area:.6g}, volume {_volume(part.volume)}"
+        for part in largest
+    ]
+    rest = len(parts) - len(largest)
+    more = [f"    and {rest} smaller {kind}s" if rest > 1 else f"    and 1 smaller {kind}"]
+    return [] if len(parts) < 2 else lines + more * (rest > 0)
+
+
+def _volume(volume: float | None) -> str:
+    return "unknown" if volume is None else f"{volume:.6g}"
+
+
+def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
+    """What a case does to space, to its mesh and to derivatives."""
     from dataclasses import asdict
 
     from ..pipeline import examine

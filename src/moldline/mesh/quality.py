@@ -4,11 +4,19 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._types import Array
+from . import topology
 from .surface import Surface
 from .volume import VolumeMesh
 
-SLIVER = 1e-12
+FLAT = 1e-12
 """A face is degenerate if its height is below this fraction of its longest side."""
+
+SLIVER_DEG = 1.0
+"""A face is a sliver if its smallest angle is below this; its height is then less than 1/57 of its
+second longest side."""
+
+FOLD_DEG = 150.0
+"""Two faces are folded onto each other if their normals differ by more than this."""
 
 _CORNERS = {
     10: [(0, 1, 2, 3)],
@@ -56,7 +64,7 @@ def signed_volume(surface: Surface) -> float:
 def degenerate_faces(surface: Surface) -> Int[np.ndarray, "d"]:
     """Faces without area: two points in one place, or all three in a line."""
     longest = np.sqrt(_squared_sides(surface).max(axis=0, initial=0.0))
-    return np.flatnonzero(2 * face_areas(surface) <= SLIVER * longest**2)
+    return np.flatnonzero(2 * face_areas(surface) <= FLAT * longest**2)
 
 
 def smallest_angles(surface: Surface) -> Float[np.ndarray, "m"]:
@@ -65,6 +73,35 @@ def smallest_angles(surface: Surface) -> Float[np.ndarray, "m"]:
     twice_area = 2 * face_areas(surface)
     # the smallest angle lies opposite the shortest side: tan = 2 * 2A / (b² + c² - a²)
     return np.arctan2(2 * twice_area, np.maximum(squares[1] + squares[2] - squares[0], 0))
+
+
+def slivers(surface: Surface) -> Int[np.ndarray, "s"]:
+    """Needles and caps: faces with area whose smallest angle is below `SLIVER_DEG`."""
+    is_sliver = smallest_angles(surface) < np.radians(SLIVER_DEG)
+    is_sliver[degenerate_faces(surface)] = False
+    return np.flatnonzero(is_sliver)
+
+
+def folded_faces(surface: Surface) -> Int[np.ndarray, "f"]:
+    """Faces folded over onto their neighbours: all of two or more face the other way.
+
+    One such neighbour proves nothing, it may lie beyond a sharp edge. Looked at are neighbours that
+    have area and show the same side; the normals must differ by more than `FOLD_DEG`.
+    """
+    a, b, c = _corners(surface)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    lengths[degenerate_faces(surface)] = np.inf
+    near = topology.neighbours(surface.faces)
+    pairs = np.stack([near.one, near.other])[:, near.is_oriented]
+    pairs = pairs[:, np.isfinite(lengths[pairs]).all(axis=0)]
+    cosine = np.einsum("ij,ij->i", *normals[pairs]) / lengths[pairs].prod(axis=0)
+    is_opposite = cosine < np.cos(np.radians(FOLD_DEG))
+    count = len(normals)
+    opposite = np.bincount(pairs[:, is_opposite].ravel(), minlength=count)
+    return np.flatnonzero(
+        (opposite >= 2) & (opposite == np.bincount(pairs.ravel(), minlength=count))
+    )
 
 
 def inverted_cells(mesh: VolumeMesh) -> Int[np.ndarray, "i"]:

@@ -3,12 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Int, Shaped
+from jaxtyping import Bool, Int, Shaped
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from .._types import Array, Points
+from ..errors import ParameterError
+
+MOST_WELDED = 50
+"""Points that one may be welded to, on average; with more, the tolerance is a mistake."""
 
 
 class Edges(NamedTuple):
@@ -42,6 +46,41 @@ class Edges(NamedTuple):
     def misoriented(self) -> Int[np.ndarray, "b 2"]:
         """Edges that two faces run along in the same direction: one of them is turned over."""
         return self.ends[(self.uses == 2) & (self.forward != 1)]
+
+
+class Neighbours(NamedTuple):
+    """Pairs of faces on either side of an edge that no third face has.
+
+    Attributes
+    ----------
+    one, other
+        The two faces of each edge.
+    is_oriented
+        Whether both show the same side.
+    """
+
+    one: Int[np.ndarray, "e"]
+    other: Int[np.ndarray, "e"]
+    is_oriented: Bool[np.ndarray, "e"]
+
+
+class Turns(NamedTuple):
+    """What would make the faces of each patch show the same side.
+
+    Attributes
+    ----------
+    patch
+        Faces joined through edges of two faces have the same number.
+    is_turned
+        Faces that show another side than the first one of their patch.
+    is_orientable
+        Of each patch, whether its faces can show the same side at all; a Moebius strip's cannot,
+        and none of them counts as turned.
+    """
+
+    patch: Int[np.ndarray, "m"]
+    is_turned: Bool[np.ndarray, "m"]
+    is_orientable: Bool[np.ndarray, "p"]
 
 
 class _Sides(NamedTuple):
@@ -124,10 +163,55 @@ def pieces(faces: Array) -> tuple[int, Int[np.ndarray, "m"]]:
     return number, label
 
 
+def neighbours(faces: Array) -> Neighbours:
+    """Who lies beyond each edge of exactly two faces."""
+    sides = _sides(faces)
+    is_new, is_last = sides.is_new, np.append(sides.is_new[1:], True)
+    first = np.flatnonzero(is_new[:-1] & ~is_new[1:] & is_last[1:])
+    second = first + 1
+    return Neighbours(
+        sides.face[first], sides.face[second], sides.start[first] == sides.end[second]
+    )
+
+
+def turns(faces: Array) -> Turns:
+    """Which faces to turn over so that neighbours show the same side.
+
+    Two nodes stand for each face, as it is and turned over, and neighbours join those that agree.
+    """
+    count = len(faces)
+    near = neighbours(faces)
+    _, patch = _joined(near.one, near.other, count)
+    across = np.where(near.is_oriented, 0, count)
+    _, side = _joined(
+        np.concatenate([near.one, near.one + count]),
+        np.concatenate([near.other + across, near.other + count - across]),
+        2 * count,
+    )
+    as_is, over = side[:count], side[count:]
+    patches = int(patch.max(initial=-1)) + 1
+    is_orientable = np.ones(patches, bool)
+    is_orientable[patch[as_is == over]] = False
+    _, first = np.unique(patch, return_index=True)
+    is_turned = (as_is != as_is[first][patch]) & is_orientable[patch]
+    return Turns(patch, is_turned, is_orientable)
+
+
 def duplicate_faces(faces: Array) -> Int[np.ndarray, "d"]:
     """Faces that have the same three points as an earlier one, in any order."""
     first = _first_equal(np.sort(faces, axis=1))
     return np.flatnonzero(first != np.arange(len(first)))
+
+
+def back_to_back_faces(faces: Array) -> Int[np.ndarray, "d"]:
+    """Faces that have the points of an earlier one in the other sense, and none in their own."""
+    ordered = np.sort(faces, axis=1)
+    a, b, c = np.asarray(faces).T
+    is_forward = (a < b).astype(int) + (b < c) + (c < a) == 2
+    first = _first_equal(ordered)
+    own = _first_equal(np.column_stack([ordered, is_forward]))
+    here = np.arange(len(first))
+    return np.flatnonzero((own == here) & (first != here))
 
 
 def duplicate_points(points: Points, tolerance: float = 0.0) -> Int[np.ndarray, "d"]:
@@ -144,11 +228,13 @@ def weld(
     Of points that lie within `tolerance` of each other [the points' unit], directly or through
     others, the first is kept; with 0 they must be equal (and 0.0 equals -0.0).
     """
+    if not 0 <= tolerance < np.inf:
+        raise ParameterError(f"a weld's tolerance must be a finite length, got {tolerance}")
     points = np.asarray(points)
     first = _first_equal(points)
     if tolerance > 0 and len(points):
         lone = np.flatnonzero(first == np.arange(len(first)))
-        near = cKDTree(points[lone]).query_pairs(tolerance, output_type="ndarray")
+        near = _pairs_within(points[lone], tolerance)
         _, group = _joined(near[:, 0], near[:, 1], len(lone))
         _, place = np.unique(group, return_index=True)
         leader = np.empty(len(points), np.int64)
@@ -156,6 +242,17 @@ def weld(
         first = leader[first]
     kept, index = np.unique(first, return_inverse=True)
     return kept, index
+
+
+def _pairs_within(points: np.ndarray, tolerance: float) -> Int[np.ndarray, "p 2"]:
+    tree = cKDTree(points)
+    near = int(tree.count_neighbors(tree, tolerance)) // len(points) - 1
+    if near > MOST_WELDED:
+        raise ParameterError(
+            f"a weld's tolerance of {tolerance:g} joins each point to {near} others on average; it "
+            "must be well below the length of an edge: give a smaller one"
+        )
+    return tree.query_pairs(tolerance, output_type="ndarray")
 
 
 def _sides(faces: Array) -> _Sides:

@@ -1,5 +1,6 @@
 """LOOK: pictures without a display and without OpenGL."""
 
+from .faults import of_faults
 from .figure import save
 from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
 from .sections import cut, draw_section, section_picture
@@ -15,6 +16,7 @@ __all__ = [
     "draw_surface",
     "of_cuts",
     "of_deformation",
+    "of_faults",
     "of_geometry",
     "of_sensitivity",
     "save",

@@ -116,8 +116,8 @@ def before_and_after(
 ) -> Figure:
     """A picture of a surface at rest with its lattices, and deformed with them moved."""
     shapes = [points, moved, *(grid for lattice in lattices for grid in lattice)]
-    low, high = _frame(shapes, view)
-    figure = _fitted(14.0, 7.0, low, high)
+    low, high = frame(shapes, view)
+    figure = fitted(14.0, 7.0, low, high)
     left, right = figure.subplots(1, 2)
     draw_surface(left, points, faces, view=view)
     draw_surface(right, moved, faces, view=view)
@@ -147,7 +147,7 @@ def sensitivity_map(
     `highlighted` pairs the number of a lattice with the control points in it that the colours
     belong to.
     """
-    figure = _fitted(11.0, 9.8, *_frame([points, *lattices], view))
+    figure = fitted(11.0, 9.8, *frame([points, *lattices], view))
     axes = figure.subplots()
     draw_surface(axes, points, faces, values, view, label)
     for number, rest in enumerate(lattices):
@@ -237,14 +237,14 @@ def _brightness(normals: np.ndarray) -> np.ndarray:
     return 0.38 + 0.7 * (0.5 + 0.5 * slant) ** 1.5
 
 
-def _frame(shapes: Sequence[Any], view: View | str) -> tuple[np.ndarray, np.ndarray]:
+def frame(shapes: Sequence[Any], view: View | str) -> tuple[np.ndarray, np.ndarray]:
     """Lower left and upper right corner of everything, projected."""
     flat = np.concatenate([np.reshape(shape, (-1, 3)) for shape in shapes])
     flat = View.of(view).project(flat)[:, :2]
     return flat.min(axis=0), flat.max(axis=0)
 
 
-def _fitted(width: float, panel: float, low: np.ndarray, high: np.ndarray) -> Figure:
+def fitted(width: float, panel: float, low: np.ndarray, high: np.ndarray) -> Figure:
     """An empty figure with panels of a given width [in] and the proportions of what they show."""
     across, up = high - low
     return blank(width, float(np.clip(panel * up / (across or 1.0), 2.5, 10.0)) + 0.7)

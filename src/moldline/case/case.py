@@ -13,8 +13,8 @@ from .. import registry
 from .._types import Points
 from ..deformers.base import AbstractDeformer
 from ..errors import CaseError, MoldlineError, ParameterError
-from ..mesh import Geometry
-from ..mesh.io import read
+from ..mesh import Cloud, Geometry
+from ..mesh.io import METRES, found, mapped, read
 from ..mesh.io.files import replacing
 from ..parameters.link import Link
 from ..parameters.links import LINKS, mirrored
@@ -94,13 +94,18 @@ class Case:
             stream.write(tomli_w.dumps(_without_none(tables)).encode())
 
 
-def load(path: str | os.PathLike[str]) -> Case:
-    """Read a case file and the geometries it names."""
+def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
+    """Read a case file and the geometries it names.
+
+    With `sampled`, of each geometry only the few points are kept that reach farthest along the
+    axes of space: enough to set the case up when the rest is to be streamed.
+    """
     place = Path(path)
     file = str(place)
     tables = schema.parse(schema.text_of(place), file)
     geometries = {
-        name: _read(place, table, f"geometry.{name}") for name, table in tables.geometry.items()
+        name: _read(place, table, f"geometry.{name}", sampled)
+        for name, table in tables.geometry.items()
     }
     variables = {name: _variable(file, name, table) for name, table in tables.variable.items()}
     stages = [
@@ -115,7 +120,7 @@ def load(path: str | os.PathLike[str]) -> Case:
     try:
         pipeline = Pipeline(geometries, stages)
         riders = {
-            name: pipeline.embed(_read(place, table, f"rider.{name}"), table.on, name)
+            name: pipeline.embed(_read(place, table, f"rider.{name}", sampled), table.on, name)
             for name, table in tables.rider.items()
         }
     except MoldlineError as error:
@@ -125,9 +130,17 @@ def load(path: str | os.PathLike[str]) -> Case:
     return Case(place, tables, pipeline, riders)
 
 
-def _read(case: Path, table: schema.GeometryTable | schema.RiderTable, where: str) -> Geometry:
+def _read(
+    case: Path, table: schema.GeometryTable | schema.RiderTable, where: str, sampled: bool
+) -> Geometry:
+    if not table.file.isprintable():  # a message with it might command the terminal
+        raise CaseError(f"{case}: {where}.file: {table.file!r} holds control characters")
+    file = case.parent / table.file
     try:
-        return read(case.parent / table.file, units=table.units)
+        if sampled:
+            scale = METRES[table.units] if table.units else 1.0
+            return Cloud(scale * mapped.extremes(found(file), file))
+        return read(file, units=table.units)
     except MoldlineError as error:
         raise CaseError(f"{case}: {where}.file: {error}") from None
 

@@ -2,12 +2,17 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from . import show, values
 
+if TYPE_CHECKING:
+    from ..case import Case
+
 HELP = "Deform a case's geometry by its variables' values and write it."
 EXAMPLE = """\
-  moldline deform examples/transport_wing.toml --set thickness[3]=0.1 -o wing_new.tri"""
+  moldline deform examples/transport_wing.toml --set thickness[3]=0.1 -o wing_new.tri
+  moldline deform huge.toml --stream -o huge_new.tri"""
 
 
 def configure(command: argparse.ArgumentParser) -> None:
@@ -17,6 +22,12 @@ def configure(command: argparse.ArgumentParser) -> None:
         "-o", "--output", type=Path, help="file to write; its name tells the format"
     )
     command.add_argument("--rider", help="deform this rider of the case instead of its geometry")
+    command.add_argument(
+        "--stream",
+        action="store_true",
+        help="file to file, some points at a time: for meshes larger than memory "
+        "(binary tri, STL and PLOT3D)",
+    )
     command.add_argument("--json", action="store_true", help="report for a script")
 
 
@@ -31,12 +42,14 @@ def run(given: argparse.Namespace) -> int:
     from ..mesh.io import write
     from ..pipeline import examine
 
-    case = load(given.case)
+    case = load(given.case, sampled=given.stream)
     chosen = values.chosen(case, given)
     pipeline = case.rider(given.rider) if given.rider else case.pipeline
     target = given.output or case.output("surface")
     if target is None:
         raise ParameterError("where to? give -o FILE, or output.surface in the case file")
+    if given.stream:
+        return _streamed(case, target, chosen, given)
     pipeline(chosen)
     start = time.perf_counter()
     shape = pipeline(chosen)
@@ -57,4 +70,13 @@ def run(given: argparse.Namespace) -> int:
         *map(str, torn),
     ]
     show(report, given.json, lines)
+    return 0
+
+
+def _streamed(case: "Case", target: Path, chosen: dict[str, Any], given: argparse.Namespace) -> int:
+    from ..case import streaming
+
+    points, moved = streaming.deform(case, target, chosen, given.rider)
+    report = {"points": points, "largest_motion": moved, "file": str(target)}
+    show(report, given.json, [f"{target}: {points} points, moved by up to {moved:.6g}"])
     return 0

@@ -1,5 +1,6 @@
 """A lattice: free-form deformation by a box of control points."""
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -17,6 +18,9 @@ from .base import AbstractBinding, DefinedBinding
 from .embedding import EmbeddedBinding, Embedding, Part
 from .lattice_kernels import Following
 from .net import AXES, AbstractControlNet
+
+LONGEST, MOST = 512, 2**20
+"""Control points along an axis, and in all; more are a slip of the pen."""
 
 Triple = tuple[int, int, int]
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
@@ -130,9 +134,15 @@ class Lattice(AbstractControlNet):
         """
         points = np.asarray(getattr(geometry, "points", geometry))
         if component is not None:
+            if not hasattr(geometry, "component"):
+                raise ParameterError(
+                    f"component = {component!r}: a {type(geometry).__name__} has no components "
+                    "(one that is streamed neither); give low and high instead"
+                )
             points = points[geometry.component(component)]
         low, high = points.min(axis=0), points.max(axis=0)
-        room = np.broadcast_to(np.asarray(margin, float), 3) * (high - low)
+        with np.errstate(over="ignore", invalid="ignore"):  # refused below with what came out
+            room = np.broadcast_to(np.asarray(margin, float), 3) * (high - low)
         return cls.box(low - room, high + room, shape, **options)
 
     @classmethod
@@ -285,6 +295,11 @@ def _frozen(
 def _counts(shape: Sequence[int]) -> Triple:
     if len(shape) != 3 or any(n != int(n) or n < 1 for n in shape):
         raise ParameterError(f"a lattice has three counts of at least 1, got {tuple(shape)}")
+    if max(shape) > LONGEST or math.prod(map(int, shape)) > MOST:
+        raise ParameterError(
+            f"a lattice has at most {LONGEST} points along an axis and {MOST} in all, got "
+            f"{tuple(shape)}; give fewer"
+        )
     return int(shape[0]), int(shape[1]), int(shape[2])
 
 
@@ -297,7 +312,9 @@ def _spanning(origin: Any, edges: Any) -> tuple[np.ndarray, np.ndarray]:
         )
     lengths = np.linalg.norm(edges, axis=1, keepdims=True)
     if not np.isfinite(origin).all() or not np.isfinite(lengths).all():
-        raise ParameterError(f"origin and edges must be finite, got {origin} and {edges}")
+        raise ParameterError(
+            f"origin and edges must be finite, got {origin.tolist()} and {edges.tolist()}"
+        )
     if np.any(lengths == 0) or abs(np.linalg.det(edges / lengths)) < 1e-9:
         raise ParameterError(f"the edges of a lattice must span a box, got {edges.tolist()}")
     return origin, edges

@@ -70,6 +70,12 @@ class Layout(NamedTuple):
             at += size + 4 * self.records
         return arrays
 
+    def view(self, data: np.ndarray, parts: Sequence[Part], number: int) -> np.ndarray:
+        """One part of a file whose size is right, where it lies in the file's bytes."""
+        begin = self.size(parts[:number]) + 4 * self.records
+        dtype = self.type(parts[number].kind)
+        return data[begin : begin + parts[number].length * dtype.itemsize].view(dtype)
+
     def joined(self, arrays: Sequence[Array], path: Path | str) -> Iterator[bytes]:
         """The bytes of a file of these arrays."""
         for array in arrays:

@@ -6,8 +6,8 @@ order, a raw stream or Fortran records, floats of 4 or 8 bytes; each of them may
 gzip. A file without the number of blocks holds one. Where the header has two numbers per block
 (nk absent; not in a raw stream, where that would be a guess) nk is 1, and if z is absent as well it
 is 0. Which of all these it is follows from the first lines or records, which must hold nothing but
-the number of blocks and the shapes, and from the amount of data. (So a raw stream of 8-byte floats
-cut exactly in half passes for one of 4-byte floats; Fortran records are safer.)
+the number of blocks and the shapes, and from the amount of data. A raw stream of 4-byte floats that
+look like the halves of 8-byte ones is refused, because half of such a file has the same size.
 
 Lost on writing: nothing, but the file always names the number of blocks, nk and z. Text and 8-byte
 floats keep every bit; 4-byte floats round. Blanking (IBLANK) is neither read nor written.
@@ -28,6 +28,7 @@ from . import binary as layouts
 from . import text
 from .binary import Fit, Layout, Part
 from .files import HEAD, contents, replacing
+from .mapped import Run
 
 NAME = "PLOT3D"
 SUFFIXES = (".xyz", ".p3d", ".x", ".grd", ".fmt")
@@ -70,7 +71,7 @@ def sniff(head: bytes, path: Path | str) -> bool:
         return any(fit.size == size for fit in _fits(head))
     words = text.unix(head[: head.rfind(b"\n")]).split()
     begin = list(takewhile(_COUNT.fullmatch, words))
-    headers = list(_text_headers(np.array(begin, np.float64), head))
+    headers = _text_headers(np.array(begin, np.float64), head)
     return bool(headers) and text.may_hold(head, path, [header.size for header in headers])
 
 
@@ -79,11 +80,16 @@ def read(path: Path | str) -> Grid:
     data = contents(path)
     if text.is_text(data[:4096]):
         values = text.numbers(data, path)
-        header = _fitting(list(_text_headers(values, data)), values, path)
+        header = _fitting(_text_headers(values, data), values, path)
         ends = np.cumsum([p.length for p in header.parts])
         blocks = np.split(values, ends)[len(header.lengths) : -1]
         return _grid([p.reshape(header.coordinates, -1) for p in blocks], header.shapes, path)
     fit = layouts.fitting(_fits(data), len(data), path)
+    if fit.layout.precision == 4 and not fit.layout.records and _are_halves(data, fit):
+        raise FileError(
+            f"{path}: holds halves of 8-byte floats, or else points without any order; "
+            "was the copy cut in half?"
+        )
     blocks = [p for p in fit.layout.split(data, fit.parts, path) if p.dtype.kind == "f"]
     header = next(h for h in _binary_headers(data, fit.layout) if h.parts == fit.parts)
     return _grid([p.reshape(header.coordinates, -1) for p in blocks], header.shapes, path)
@@ -113,6 +119,18 @@ def write(
             file.write(piece)
 
 
+def runs(data: np.ndarray, path: Path | str) -> list[Run]:
+    """Where the coordinates lie in the bytes of a binary file, a run per block."""
+    head = text.binary_head(data, path)
+    fit = layouts.fitting(_fits(head), len(data), path)
+    header = next(h for h in _binary_headers(head, fit.layout) if h.parts == fit.parts)
+    if header.coordinates != 3:
+        raise FileError(f"{path}: a plane grid has no room for z; convert it first")
+    blocks = [n for n, part in enumerate(fit.parts) if part.kind == "f"]
+    views = (fit.layout.view(data, fit.parts, n).reshape(3, -1) for n in blocks)
+    return [Run(view.T[:, None]) for view in views]
+
+
 def _headers(values: np.ndarray) -> Iterator[Header]:
     """Every way to read the first numbers as the shapes of blocks, the usual first."""
     count = int(values[0]) if len(values) and values[0] in range(1, len(values)) else 0
@@ -125,14 +143,22 @@ def _headers(values: np.ndarray) -> Iterator[Header]:
             yield Header((rank,), one, coordinates)
 
 
-def _text_headers(values: np.ndarray, data: bytes) -> Iterator[Header]:
-    """As `_headers`, for a text, in which each part of the header ends with a line."""
+def _text_headers(values: np.ndarray, data: bytes) -> list[Header]:
+    """As `_headers`, for a text, in which each part of the header ends with a line.
+
+    A block's shape may run on in the next line only where no other header fits.
+    """
     lines = text.unix(data[:HEAD]).split(b"\n")
     ends = [end for end in np.cumsum([len(line.split()) for line in lines]).tolist() if end]
+    fitting, tidy = [], []
     for header in _headers(values):
         parts = np.cumsum(header.lengths).tolist()
         if parts[0] == ends[0] and parts[-1] in ends:
-            yield header
+            fitting.append(header)
+            inner = (end - parts[0] for end in ends if parts[0] <= end <= parts[-1])
+            if all(end % len(header.shapes[0]) == 0 for end in inner):
+                tidy.append(header)
+    return tidy or fitting
 
 
 def _shapes(values: np.ndarray, rank: int) -> tuple[tuple[int, ...], ...]:
@@ -191,6 +217,20 @@ def _fits(data: bytes) -> list[Fit]:
         for header in _binary_headers(data, layout)
     ]
     return layouts.likely(fits)
+
+
+def _are_halves(data: bytes, fit: Fit) -> bool:
+    """Whether 4-byte floats are rather the halves of 8-byte ones.
+
+    Neighbours in a grid are alike; the two halves of a float know nothing of each other.
+    """
+    begin = sum(4 * part.length for part in fit.parts if part.kind == "i")
+    floats = np.frombuffer(data, fit.layout.type("f"), offset=begin)
+    with np.errstate(invalid="ignore"):  # NaN of any kind is refused later
+        pairs = np.abs(floats[: len(floats) // 2 * 2].reshape(-1, 2))
+        pairs = pairs[pairs.any(axis=1)]
+        are_apart = pairs.min(axis=1) < pairs.max(axis=1) / 4096
+    return len(pairs) > 2 and bool(are_apart.mean() > 0.75)
 
 
 def _grid(blocks: list[np.ndarray], shapes: tuple[tuple[int, ...], ...], path: Path | str) -> Grid:

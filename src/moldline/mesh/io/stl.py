@@ -21,6 +21,7 @@ from ..topology import weld
 from . import text
 from .binary import narrowed
 from .files import contents, replacing
+from .mapped import Run
 
 NAME = "STL"
 SUFFIXES = (".stl",)
@@ -67,9 +68,7 @@ def read(path: Path | str, tolerance: float = 0.0) -> Surface:
 def write(path: Path | str, surface: Surface, binary: bool = False) -> None:
     """Write text with a solid per component, or binary data."""
     corners = np.asarray(surface.points)[surface.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)
+    normals = facing(corners)
     with replacing(path) as file:
         if binary:
             records = np.zeros(len(corners), _RECORD)
@@ -82,11 +81,29 @@ def write(path: Path | str, surface: Surface, binary: bool = False) -> None:
             return
         for number, name in enumerate(surface.components):
             own = surface.tags == number
-            title = " ".join(name.split()).encode()
+            title = text.title(name)
             file.write(b"solid " + title + b"\n")
             for lines in _facets(normals[own], corners[own]):
                 file.write(lines)
             file.write(b"endsolid " + title + b"\n")
+
+
+def facing(corners: np.ndarray) -> np.ndarray:
+    """Unit normals; zero where a triangle has none that can be computed."""
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+    sound = (length > 0) & np.isfinite(length)
+    return np.divide(normals, length, out=np.zeros_like(normals), where=sound)
+
+
+def runs(data: np.ndarray, path: Path | str) -> list[Run]:
+    """Where the corners and normals lie in the bytes of a binary file."""
+    head = data[:84].tobytes()
+    if len(head) < 84 or len(data) != _size(head):
+        raise FileError(f"{path}: only binary STL can be streamed; convert it")
+    records = data[84:].view(_RECORD)
+    return [Run(records["corners"], records["normal"])]
 
 
 def _is_text(head: bytes) -> bool:

@@ -12,7 +12,7 @@ from ..._types import Array
 from ...errors import FileError
 from .files import EXPANSION, HEAD
 
-LARGEST = 2**24
+LARGEST = 2**18
 """Numbers that repeat counts may stand for in a file that is itself shorter than this."""
 
 NUMBER = re.compile(
@@ -21,6 +21,8 @@ NUMBER = re.compile(
 )
 """What Fortran, C and Python write: `1.5e-3`, `1.5D-3`, `1.5-300` and `3*0.0`."""
 
+_TOKEN = re.compile(rb"[^ \t\n\r\v\f]+")
+_GAP = re.compile(rb"[ \t\n\r\v\f]")
 _SPACE = np.zeros(256, bool)
 _SPACE[list(b" \t\n\r\v\f")] = True
 _D_TO_E = bytes.maketrans(b"dD", b"eE")
@@ -41,12 +43,8 @@ def numbers(text: bytes, path: Path | str, line: int = 1, finite: bool = True) -
 
     `line` is the file's line at which the text begins, for the error message.
     """
-    values = _fast(text)
-    if values is None and re.search(rb"[dD]", text):
-        values = _fast(text.translate(_D_TO_E))
-    if values is None or (finite and not np.isfinite(values).all()):
-        values = _slow(text, path, line, finite)
-    return values
+    values = _fast(text, finite)
+    return _in_parts(text, path, line, finite) if values is None else values
 
 
 def rows(text: bytes, path: Path | str, line: int = 1) -> Rows:
@@ -102,6 +100,11 @@ def unix(text: bytes) -> bytes:
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in text else text
 
 
+def title(name: str) -> bytes:
+    """A name as it can end a line: white space becomes one blank, what cannot be seen a `?`."""
+    return "".join(c if c.isprintable() else "?" for c in " ".join(name.split())).encode()
+
+
 def decoded(name: bytes) -> str:
     """A name in UTF-8, or else in Latin-1, which every byte is part of."""
     try:
@@ -110,9 +113,23 @@ def decoded(name: bytes) -> str:
         return name.decode("latin-1")
 
 
+def quoted(found: bytes | str) -> str:
+    """A piece of a file for a message: not too long, and nothing that a terminal would obey."""
+    word = decoded(found) if isinstance(found, bytes) else found
+    return repr(word if len(word) <= 60 else word[:57] + "...")
+
+
 def is_text(head: bytes) -> bool:
     """Whether the bytes hold no control characters but white space."""
     return re.search(rb"[\x00-\x08\x0e-\x1f]", head) is None
+
+
+def binary_head(data: np.ndarray, path: Path | str) -> bytes:
+    """The first bytes of a file, which must not be text."""
+    head: bytes = data[:HEAD].tobytes()
+    if is_text(head[:4096]):
+        raise FileError(f"{path}: only binary files can be streamed, this is text; convert it")
+    return head
 
 
 def may_hold(head: bytes, path: Path | str, counts: Iterable[int]) -> bool:
@@ -151,7 +168,15 @@ def _begins(letters: np.ndarray) -> np.ndarray:
     return np.flatnonzero(begin)
 
 
-def _fast(text: bytes) -> np.ndarray | None:
+def _fast(text: bytes, finite: bool) -> np.ndarray | None:
+    """All numbers, if they are plain ones, apart from Fortran's D."""
+    values = _plain(text)
+    if values is None and re.search(rb"[dD]", text):
+        values = _plain(text.translate(_D_TO_E))
+    return None if values is None or (finite and not np.isfinite(values).all()) else values
+
+
+def _plain(text: bytes) -> np.ndarray | None:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", DeprecationWarning)
@@ -162,22 +187,44 @@ def _fast(text: bytes) -> np.ndarray | None:
     return values if len(values) == len(_begins(np.frombuffer(text, np.uint8))) else None
 
 
-def _slow(text: bytes, path: Path | str, line: int, finite: bool) -> np.ndarray:
-    """Number by number, with repeat counts, until one is wrong."""
+def _in_parts(text: bytes, path: Path | str, line: int, finite: bool) -> np.ndarray:
+    """Fast but where something is not plain, so that a fault in a big file is found soon."""
+    values, room = [np.empty(0)], max(len(text), LARGEST)
+    for part in _parts(text):
+        found = _fast(part, finite)
+        values.append(_slow(part, path, line, finite, room) if found is None else found)
+        room -= len(values[-1])
+        line += line_at(part, len(part)) - 1
+    return np.concatenate(values)
+
+
+def _parts(text: bytes) -> Iterator[bytes]:
+    """A text cut between tokens into pieces of about `HEAD` bytes."""
+    begin = 0
+    while begin < len(text):
+        gap = _GAP.search(text, begin + HEAD)
+        end = gap.start() if gap else len(text)
+        yield text[begin:end]
+        begin = end
+
+
+def _slow(text: bytes, path: Path | str, line: int, finite: bool, room: int) -> np.ndarray:
+    """Number by number, with repeat counts, until one is wrong or `room` is used up."""
     values: list[float] = []
     counts: list[int] = []
-    total, most = 0, max(len(text), LARGEST)
-    for token in re.finditer(rb"[^ \t\n\r\v\f]+", text):
+    for token in _TOKEN.finditer(text):
         value = _value(token[0])
         if value is None or (finite and not np.isfinite(value)):
             raise _wrong(token, text, path, line)
         repeat, star, _ = token[0].partition(b"*")
         counts.append(int(repeat[:12]) if star else 1)
         values.append(value)
-        total += counts[-1]
-        if total > most:
+        room -= counts[-1]
+        if room < 0:
             where = line_at(text, token.start()) + line - 1
-            raise FileError(f"{path}: line {where}: repeat counts make more than {most} numbers")
+            raise FileError(
+                f"{path}: line {where}: repeat counts make too many numbers; write them out"
+            )
     return np.repeat(np.array(values, np.float64), np.array(counts, np.int64))
 
 
@@ -190,7 +237,6 @@ def _value(token: bytes) -> float | None:
 
 
 def _wrong(token: re.Match[bytes], text: bytes, path: Path | str, line: int) -> FileError:
-    found = decoded(token[0][:40])
     if _value(token[0]) is not None:
         advice = "a finite number; mend the program that wrote it"
     elif re.fullmatch(rb"[+-]?\d+,\d*(?:[eE][+-]?\d+)?", token[0]):
@@ -198,4 +244,4 @@ def _wrong(token: re.Match[bytes], text: bytes, path: Path | str, line: int) -> 
     else:
         advice = "a number"
     where = line_at(text, token.start()) + line - 1
-    return FileError(f"{path}: line {where}: found {found!r}, expected {advice}")
+    return FileError(f"{path}: line {where}: found {quoted(token[0])}, expected {advice}")

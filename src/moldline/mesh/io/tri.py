@@ -1,8 +1,9 @@
 """Cart3D triangulations: `.tri`, `.i.tri` with components and `.triq` with scalars.
 
-The file holds points and triangles, one whole number per triangle for its component, and any
-number of scalars per point. It is free-format text, or binary: either byte order, a raw stream or
-Fortran records, floats of 4 or 8 bytes; reading finds out which.
+The file holds points and triangles, one whole number per triangle for its component (`.i.tri` and
+files with scalars must have them), and any number of scalars per point. It is free-format text, or
+binary: either byte order, a raw stream or Fortran records, floats of 4 or 8 bytes; reading finds
+out which.
 
 Lost on writing: components' names that are not whole numbers (they are numbered from 1),
 components without triangles, data on faces, the names of point data (the first reads back as
@@ -23,10 +24,15 @@ from . import binary as layouts
 from . import text
 from .binary import Fit, Part
 from .files import contents, replacing
+from .mapped import Run
 
 NAME = "Cart3D tri"
 SUFFIXES = (".tri", ".triq")
 HOLDS = Surface
+
+
+PROMISE = re.compile(r"\.i\.tri(\.gz)?$", re.IGNORECASE)
+"""Names of files that hold components."""
 
 
 class Counts(NamedTuple):
@@ -64,8 +70,9 @@ def sniff(head: bytes, path: Path | str) -> bool:
         return False
     counts = [int(word[:10]) for word in header] + [0] * (3 - len(header))
     points, faces, scalars = counts
-    parts = (Counts(points, faces, scalars, has_ids).parts for has_ids in (False, True))
-    return text.may_hold(head, path, [len(header) + sum(p.length for p in some) for some in parts])
+    parts = [Counts(points, faces, scalars, has_ids).parts for has_ids in (False, True)]
+    sizes = [len(header) + sum(part.length for part in some) for some in parts]
+    return text.may_hold(head, path, sizes[scalars > 0 :])
 
 
 def read(path: Path | str) -> Surface:
@@ -89,12 +96,12 @@ def write(
 ) -> None:
     """Write text, or binary data where `binary` is `"little"` or `"big"`."""
     points = np.asarray(surface.points)
-    ids = _ids(surface.components)
+    ids = whole_ids(surface.components)
     has_scalars = ".triq" in Path(path).suffixes
     scalars = _scalars(surface) if has_scalars else []
     header = [len(points), len(surface.faces)] + [len(scalars)] * has_scalars
     arrays = [points, surface.faces + 1]
-    if has_scalars or surface.components != ("1",):
+    if has_scalars or PROMISE.search(str(path)) or surface.components != ("1",):
         arrays.append(ids[surface.tags][:, None])
     if scalars:
         arrays.append(np.stack(scalars, axis=1))
@@ -109,6 +116,12 @@ def write(
             file.write(piece)
 
 
+def runs(data: np.ndarray, path: Path | str) -> list[Run]:
+    """Where the coordinates lie in the bytes of a binary file."""
+    fit = layouts.fitting(_fits(text.binary_head(data, path)), len(data), path)
+    return [Run(fit.layout.view(data, fit.parts, 1).reshape(-1, 1, 3))]
+
+
 def _fits(data: bytes) -> list[Fit]:
     """Every way to understand the header as a binary one."""
     fits = []
@@ -118,7 +131,7 @@ def _fits(data: bytes) -> list[Fit]:
             if header is None or min(header) < 1:
                 continue
             scalars = header[2] if length == 3 else 0
-            for has_ids in (False, True):
+            for has_ids in (False, True)[scalars > 0 :]:  # scalars follow components
                 counts = Counts(header[0], header[1], scalars, has_ids)
                 fits.append(Fit(layout, (Part("i", length), *counts.parts), str(counts)))
     return layouts.likely(fits)
@@ -149,7 +162,7 @@ def _options(values: np.ndarray, length: int, path: Path | str) -> Iterator[tupl
     points = text.count_of(values[0], path, "vertices")
     faces = text.count_of(values[1], path, "triangles")
     scalars = text.count_of(values[2], path, "scalars", least=0) if length == 3 else 0
-    for has_ids in (False, True):
+    for has_ids in (False, True)[scalars > 0 :]:  # scalars follow components
         yield length, Counts(points, faces, scalars, has_ids)
 
 
@@ -161,6 +174,11 @@ def _surface(counts: Counts, parts: list[np.ndarray], path: Path | str) -> Surfa
     faces = text.indices(
         parts[1].reshape(-1, 3), len(points), path, lambda row: f"triangle {row + 1}"
     )
+    if not counts.has_ids and PROMISE.search(str(path)):
+        raise FileError(
+            f"{path}: has no components, which its name promises; was the copy cut short? "
+            "Call it .tri if it is whole"
+        )
     tags, components = None, None
     if counts.has_ids:
         ids = parts[2]
@@ -175,7 +193,7 @@ def _surface(counts: Counts, parts: list[np.ndarray], path: Path | str) -> Surfa
     return Surface(points, faces, tags, components, data)
 
 
-def _ids(components: tuple[str, ...]) -> np.ndarray:
+def whole_ids(components: tuple[str, ...]) -> np.ndarray:
     """Whole numbers for the components: their names where those are, else 1, 2, ..."""
     if all(re.fullmatch("0|[1-9][0-9]{0,8}", name) for name in components):
         return np.array([int(name) for name in components], np.int32)

@@ -4,7 +4,7 @@ usage: python benchmarks/embedding.py [--markdown] [--sizes 1300 48000 ...]
 
 A box of 10 x 10 x 10 control points, once straight and once bent, around points spread evenly in
 it. `deform/lattice` compares with a lattice of the same counts on the same points, in the same run.
-pyGeo's times are those of version 1.17 on one core of such a machine, measured once for cubic boxes.
+pyGeo's times are those of version 1.17 on one core of such a machine, measured once, straight box.
 """
 
 import argparse

@@ -9,7 +9,7 @@ PUBLIC = {
     "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "Cloud", "ControlVolume",
     "Geometry", "Grid", "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage", "Surface", "Variable",
     "VolumeMesh", "errors", "links", "load", "plot", "read", "variable", "write",
-    "write_sensitivities",
+    "read_sensitivities", "write_sensitivities",
 }  # fmt: skip
 
 

@@ -61,7 +61,7 @@ def main(name: str, folder: Path) -> None:
         edges=[list(e) for e in spans],
         moves=moves,
     )
-    (folder / f"{name}.toml").write_text(text)
+    (folder / f"{name}.toml").write_text(text, encoding="utf-8")
     _write_obj(body, folder / f"{name}.obj")
 
 
@@ -79,7 +79,7 @@ def _edge(cage, rest, shape, steps, axis):
 def _write_obj(body, path):
     mesh = body.data
     mesh.calc_loop_triangles()
-    with path.open("w") as file:
+    with path.open("w", encoding="utf-8") as file:
         for vertex in mesh.vertices:
             file.write("v {!r} {!r} {!r}\n".format(*(body.matrix_world @ vertex.co)))
         for triangle in mesh.loop_triangles:

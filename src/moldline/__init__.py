@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .deformers.lattice import Lattice
     from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
     from .mesh.io import read, write
-    from .mesh.io.sensitivities import write_sensitivities
+    from .mesh.io.sensitivities import read_sensitivities, write_sensitivities
     from .parameters import links
     from .parameters.link import Link
     from .parameters.variable import Variable, variable
@@ -51,6 +51,7 @@ _HOMES = {
     "load": "case",
     "plot": "",
     "read": "mesh.io",
+    "read_sensitivities": "mesh.io.sensitivities",
     "variable": "parameters.variable",
     "write": "mesh.io",
     "write_sensitivities": "mesh.io.sensitivities",

@@ -217,7 +217,9 @@ def test_memory_does_not_grow_with_the_file(tmp_path):
     for name, count in (("small", 1_200_000), ("large", 12_000_000)):
         (tmp_path / name).mkdir()
         points = rng.uniform(0, 1, (count, 3))
-        ml.write(tmp_path / name / "a.xyz", ml.Grid(points, ((count // 400, 400, 1),)), binary="little")
+        ml.write(
+            tmp_path / name / "a.xyz", ml.Grid(points, ((count // 400, 400, 1),)), binary="little"
+        )
         del points
         names += [case(tmp_path / name, "a.xyz"), str(tmp_path / name / "b.xyz")]
     command = [sys.executable, "-c", MEASURE, *names]

@@ -58,7 +58,7 @@ def test_pictures_are_also_written_as_drawings(ball, tmp_path):
 
 
 def test_a_picture_that_cannot_be_written_says_why(tmp_path):
-    with pytest.raises(FileError, match="cannot be written: No such file"):
+    with pytest.raises(FileError, match="no such folder; make it first"):
         ml.plot.save(blank(), tmp_path / "missing" / "x.png")
 
 

@@ -1,6 +1,7 @@
 """Options of deformers and links, checked against the signatures of what they are passed to."""
 
 import inspect
+import reprlib
 import typing
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -11,6 +12,9 @@ from ..deformers.base import AbstractDeformer
 from ..parameters.links import chosen_controls
 
 Numbers = float | list[Any]
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = 120
 
 
 class _Closed(BaseModel):
@@ -74,7 +78,8 @@ def problems(error: ValidationError, where: str, given: Any) -> list[str]:
         else:
             said = problem["msg"].lower()
         expected.setdefault(key, []).append(said)
-        held[key] = "" if problem["type"] == "missing" and key == problem["loc"] else repr(value)
+        is_absent = problem["type"] == "missing" and key == problem["loc"]
+        held[key] = "" if is_absent else _SHORT.repr(value)
     return [
         ".".join(map(str, filter(lambda part: part != "", (where, *key))))
         + f": {' or '.join(dict.fromkeys(said))}"

@@ -7,7 +7,8 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .. import registry
-from ..errors import CaseError
+from ..errors import CaseError, FileError
+from ..mesh.io.files import contents
 from ..parameters.links import LINKS
 from ..parameters.variable import UNITS
 from . import options
@@ -98,8 +99,10 @@ def parse(text: str, file: str) -> CaseTable:
     """Validate a case file's text; `file` is what errors call it."""
     try:
         tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{file}: not TOML: {error}") from None
+    except ValueError as error:  # tomllib lets those of too long numbers through
+        raise CaseError(f"{file}: not TOML: {str(error)[:300]}") from None
+    except RecursionError:
+        raise CaseError(f"{file}: not TOML: nested too deep") from None
     if tables.get("moldline", VERSION) != VERSION:
         raise CaseError(
             f"{file}: moldline: format version {tables['moldline']!r} found, expected {VERSION}; "
@@ -164,8 +167,9 @@ def _choice(table: dict[str, Any], key: str, models: dict[str, type[BaseModel]])
 def text_of(path: Path) -> str:
     """A case file's text."""
     try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
+        return contents(path).decode()
+    except FileError as error:
+        told = str(error).removeprefix(f"{path}: ").removeprefix("cannot read it: ")
+        raise CaseError(f"{path}: cannot be read: {told}") from None
     except UnicodeDecodeError as error:
         raise CaseError(f"{path}: not a text file: byte {error.start} is not UTF-8") from None

@@ -2,6 +2,7 @@
 
 import argparse
 import importlib
+import io
 import json
 import sys
 from collections.abc import Callable, Sequence
@@ -55,6 +56,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     from ..errors import MoldlineError
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # some systems' output takes few letters
+            stream.reconfigure(errors="backslashreplace")
     try:
         return int(given.run(given) or 0)
     except MoldlineError as error:

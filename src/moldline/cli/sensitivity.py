@@ -7,14 +7,24 @@ from . import show, values
 
 HELP = "Write the deformed geometry with its exact derivatives by the design variables."
 EXAMPLE = """\
-  moldline sensitivity examples/transport_wing.toml --variable thickness -o wing.vtp"""
+  moldline sensitivity examples/transport_wing.toml --variable thickness -o wing.vtp
+  moldline sensitivity examples/transport_wing.toml -o Components.trix     (Cart3D, one file)
+  moldline sensitivity examples/transport_wing.toml -o geometry --per-variable"""
 
 
 def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
     values.configure(command)
     command.add_argument(
-        "-o", "--output", type=Path, help="file to write: .vtp (surfaces) or .npz (anything)"
+        "-o",
+        "--output",
+        type=Path,
+        help="file to write: .trix or .vtp (surfaces), .npz or .h5 (anything)",
+    )
+    command.add_argument(
+        "--per-variable",
+        action="store_true",
+        help="the output is a folder: a Cart3D file NAME/Components.i.tri below it per number",
     )
     command.add_argument(
         "--variable", action="append", metavar="NAME", help="only this one; may be repeated"
@@ -41,7 +51,9 @@ def run(given: argparse.Namespace) -> int:
         for name in names
         for label, column in case.pipeline.labelled_sensitivity(chosen, name).items()
     }
-    write_sensitivities(target, case.pipeline(chosen), columns, units=case.units())
+    write_sensitivities(
+        target, case.pipeline(chosen), columns, case.units(), per_variable=given.per_variable
+    )
     largest = {k: float(np.linalg.norm(c, axis=1).max()) for k, c in columns.items()}
     reach = {k: int(np.count_nonzero(np.any(c != 0, axis=1))) for k, c in columns.items()}
     report = {"file": str(target), "largest": largest, "points_moved": reach}

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from .._types import Array
 from ..deformers.base import AbstractDeformer
@@ -105,10 +106,9 @@ def mirrored(net: AbstractControlNet, link: Link, across: Across) -> Link:
     places = net.rest.reshape(-1, 3)
     scale = float(np.ptp(places, axis=0).sum())
     flip = np.where(np.arange(3) == axis, -1.0, 1.0)
-    gaps = np.abs(places[:, None] * flip - places).sum(axis=2)
-    partner = gaps.argmin(axis=1)
+    gaps, partner = KDTree(places).query(places * flip)
     one_sided = places[:, axis].min() >= -1e-9 * scale
-    if not one_sided and gaps.min(axis=1).max() > 1e-9 * scale:
+    if not one_sided and gaps.max() > 1e-9 * scale:
         raise ParameterError(
             f"control points from {across} = {places[:, axis].min():g} to "
             f"{places[:, axis].max():g} are not symmetric about {across} = 0; make them so, or "
@@ -144,6 +144,8 @@ def _check_plane_kept(net: AbstractControlNet, link: Link, across: Across) -> No
 def _stations(lattice: Lattice, along: Any, axis: AxisName, share: np.ndarray) -> Link:
     """Controls move along an axis by their row's share of the number at their station."""
     along = (along,) if isinstance(along, str) else tuple(along)
+    if not along or len(set(along)) < len(along):
+        raise ParameterError(f"stations run along one axis or two different ones, got {along}")
     if axis in along:
         raise ParameterError(f"stations along {', '.join(along)} cannot move along {axis} too")
     shape = [1, 1, 1]

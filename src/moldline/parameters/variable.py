@@ -16,6 +16,10 @@ UNITS = {
 """What one unit is inside moldline (SI and radians)."""
 
 
+MOST = 2**20
+"""Numbers of one variable; more are a slip of the pen."""
+
+
 @dataclass(frozen=True, order=True)
 class Variable:
     """One name for one or several numbers, in the designer's own unit.
@@ -92,6 +96,10 @@ def variable(
     if unit not in UNITS:
         raise ParameterError(f"variable {name!r}: unit {unit!r} is none of {', '.join(UNITS)}")
     number = size if size is not None else np.atleast_1d(np.asarray(value, float)).size
+    if number > MOST:
+        raise ParameterError(f"variable {name!r}: size {number} is more than {MOST}; give fewer")
+    if not np.isfinite(np.asarray(value, float)).all():
+        raise ParameterError(f"variable {name!r}: its value must be finite, got {value}")
     pairs = np.asarray(bounds, float)
     try:
         values = np.broadcast_to(np.asarray(value, float), number)

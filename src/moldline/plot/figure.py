@@ -1,12 +1,12 @@
 """Figures drawn in memory, and how they are saved."""
 
-import os
 from pathlib import Path
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..errors import FileError
+from ..mesh.io.files import replacing
 
 FORMATS = (".png", ".svg", ".pdf")
 
@@ -23,11 +23,5 @@ def save(figure: Figure, path: Path | str, dpi: int = 130) -> None:
     target = Path(path)
     if target.suffix.lower() not in FORMATS:
         raise FileError(f"{path}: pictures are written as {', '.join(FORMATS)}")
-    beside = target.with_name(f".{target.name}.{os.getpid()}{target.suffix}")
-    try:
-        figure.savefig(beside, dpi=dpi, facecolor="white")
-        beside.replace(target)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)
+    with replacing(target) as file:
+        figure.savefig(file, format=target.suffix[1:].lower(), dpi=dpi, facecolor="white")

@@ -55,17 +55,19 @@ def test_tabs_comments_colours_and_continued_lines_are_understood(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (SQUARE + "f 1 2 5\n", "line 5: the face '1 2 5' needs three or more .* 1 to 4 or"),
+        (SQUARE + "f 1 2 5\n", "line 5: the face needs numbers of points from 1 to 4, or back"),
         (SQUARE + "f 1 2 0\n", "line 5: the face"),
         (SQUARE + "f 1 2 -5\n", "line 5: the face"),
-        (SQUARE + "f 1 2\n", "line 5: the face"),
-        (SQUARE + "f 1 2 x\n", "line 5: found the face '1 2 x', expected numbers of points"),
+        (SQUARE + "f 1 2\n", "line 5: found the face '1 2', expected three or more numbers"),
+        (SQUARE + "f 1 2 x\n", "line 5: found the face '1 2 x', expected three or more"),
+        (SQUARE + "f 1 2 1_0\n", "line 5: found the face '1 2 1_0', expected three or more"),
+        (SQUARE.replace("v 1 1", "w 1 1"), "line 3: found 'w', which is no keyword of OBJ"),
         (SQUARE.replace("1 1 0", "1 1 o"), "line 3: found 'o', expected a number"),
         (SQUARE.replace("1 1 0", "1 1 inf"), "line 3: found 'inf', expected a finite number"),
         (SQUARE.replace("1 1 0", "1 1"), "line 3: 'v' has 2 numbers, expected at least 3"),
         (SQUARE.replace("v 1 1 0", "v"), "line 3: found 'nothing', expected a number"),
         ("f 1 2 3\n", "no line begins with 'v'"),
-        (b"\xff\0\xfe", "no line begins with 'v'"),
+        (b"\xff\0\xfe", "line 1: found .*, which is no keyword of OBJ"),
     ],
 )
 def test_what_is_wrong_is_named_with_its_place(tmp_path, content, message):

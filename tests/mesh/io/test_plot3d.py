@@ -110,7 +110,7 @@ def test_a_binary_file_cut_short_anywhere_is_refused(tmp_path, grid, records, sh
     grid = Grid(grid.points, shapes)
     plot3d.write(tmp_path / "a.xyz", grid, binary="big", records=records)
     whole = (tmp_path / "a.xyz").read_bytes()
-    for size in set(range(len(whole))) - {len(whole) - 4 * 3 * len(grid.points)}:
+    for size in range(len(whole)):
         with pytest.raises(FileError):
             read(tmp_path, whole[:size])
     with pytest.raises(FileError, match=r"blocks with 35 points .* need"):
@@ -129,3 +129,33 @@ def test_a_binary_file_cut_short_anywhere_is_refused(tmp_path, grid, records, sh
 def test_real_files_are_read(data, name, blocks, points):
     grid = plot3d.read(data(name))
     assert (len(grid.shapes), len(grid.points)) == (blocks, points)
+
+
+@pytest.mark.parametrize("binary", ["little", "big"])
+@pytest.mark.parametrize("step", [0.5, 0.1, 0.25, 1 / 3])
+def test_half_a_stream_of_long_floats_does_not_pass_for_short_ones(tmp_path, binary, step):
+    axes = np.meshgrid(*(step * np.arange(n) for n in (5, 4, 3)), indexing="ij")
+    box = Grid(np.stack([axis.ravel(order="F") for axis in axes], axis=1), ((5, 4, 3),))
+    plot3d.write(tmp_path / "a.xyz", box, binary=binary)
+    whole = (tmp_path / "a.xyz").read_bytes()
+    with pytest.raises(FileError, match=r"halves of 8-byte floats.*was the copy cut in half"):
+        read(tmp_path, whole[: len(whole) - 4 * 3 * 60])
+
+
+@pytest.mark.parametrize("shape", [(2, 2, 1), (2, 2, 2), (2, 1, 5), (9, 7, 1)])
+@pytest.mark.parametrize("noise", [0.0, 1e-17])
+def test_boxes_and_patches_of_short_floats_are_read(tmp_path, shape, noise):
+    axes = np.meshgrid(*(np.linspace(noise, 1, n) for n in shape), indexing="ij")
+    points = np.stack([axis.ravel(order="F") for axis in axes], axis=1).astype("f4").astype(float)
+    plot3d.write(tmp_path / "a.xyz", Grid(points, (shape,)), binary="big", precision=4)
+    assert same_bits(plot3d.read(tmp_path / "a.xyz").points, points)
+
+
+def test_shapes_that_do_not_run_on_in_the_next_line_are_believed_first(tmp_path, grid):
+    plot3d.write(tmp_path / "a.xyz", grid)
+    numbers = (tmp_path / "a.xyz").read_bytes().split(b"\n")
+    header, body = numbers[:4], b" ".join(numbers[4:]).split()
+    assert len(grid.shapes) == 3
+    for count in range(len(body)):
+        with pytest.raises(FileError):
+            read(tmp_path, b"\n".join([*header, b" ".join(body[:count])]))

@@ -97,7 +97,7 @@ def test_other_sections_survive_word_for_word(tmp_path):
         ("1 1 2\n", "2*1 2\n", "line 7 or later holds repeat counts"),
         ("NMARK= 1", "NMARK= 2", "line 13: NMARK= 2, but 1 markers follow"),
         ("MARKER_TAG= wall\n", "", "line 14: MARKER_ELEMS= without MARKER_TAG="),
-        (EXTRA, SMALL[SMALL.index("MARKER_TAG") :], "line 17: a second marker named 'wall'"),
+        (EXTRA, SMALL[SMALL.index("MARKER_TAG") :], "line 17: a second marker 'wall'"),
         (SMALL, "", "the file is empty"),
         (SMALL, "\n", "found 'nothing', expected a keyword"),
     ],

@@ -100,7 +100,10 @@ def test_names_that_are_no_numbers_are_numbered(tmp_path, surface):
         (SMALL.replace("0 1 0", "0 1e999 0"), "line 4: found '1e999', expected a finite"),
         (SMALL.replace("0 1 0", "0 1.5.5 0"), r"line 4: found '1\.5\.5', expected a number"),
         (SMALL.encode().replace(b"0 1 0", b"0 \xff\xfe 0"), "line 4: found 'ÿþ'"),
-        (SMALL.replace("0 1 0", "0 99999999999999*1 0"), "line 4: repeat counts make more than"),
+        (
+            SMALL.replace("0 1 0", "0 99999999999999*1 0"),
+            "line 4: repeat counts make too many numbers",
+        ),
         ("999999999 2\n0 0 0\n", "999999999 vertices and 2 triangles need"),
         ("-3 1\n0 0 0\n", "found -3 as the number of vertices"),
         ("3\n", "the header needs 2 numbers, the file has 1"),

@@ -201,3 +201,23 @@ def test_data_that_are_no_numbers_are_refused(tmp_path):
     with pytest.raises(FileError, match="data 'w' of type <U1 cannot be written"):
         vtp.write(tmp_path / "a.vtp", words)
     assert not list(tmp_path.iterdir())
+
+
+def test_data_without_any_number_are_refused(tmp_path):
+    nothing = Surface(np.eye(3), np.array([[0, 1, 2]]), point_data={"w": np.empty((3, 0))})
+    with pytest.raises(FileError, match="data 'w' with no number per point or face cannot be"):
+        vtp.write(tmp_path / "a.vtp", nothing)
+
+
+def test_pieces_whose_data_differ_and_offsets_that_are_no_numbers_are_refused(tmp_path):
+    piece = Writer().file()
+    piece = piece[piece.index(b"<Piece") : piece.index(b"</PolyData>")]
+    data = b'<PointData><DataArray type="Int8" Name="n" NumberOfComponents="%d">%s</DataArray>'
+    ends = b"</PointData></Piece>"
+    pieces = [piece.replace(b"</Piece>", data % (size, b" 1" * 4 * size) + ends) for size in (1, 2)]
+    with pytest.raises(FileError, match="the pieces' data 'n' differ in NumberOfComponents"):
+        read(tmp_path, b"<VTKFile><PolyData>" + b"".join(pieces) + b"</PolyData></VTKFile>")
+    whole = Writer().file().replace(b'"Int32" Name="offsets"', b'"Float64" Name="offsets"')
+    for value in (b"nan", b"inf", b"4.5", b"1e300"):
+        with pytest.raises(FileError, match="'offsets': offsets must rise by 3 or more"):
+            read(tmp_path, whole.replace(b">4<", b">" + value + b"<"))

@@ -1,7 +1,7 @@
 """Reading and writing geometries, whatever their files' format.
 
 Each format is a module with `NAME`, `SUFFIXES`, what it `HOLDS`, and the functions `sniff`, `read`
-and `write`; its docstring says what the format loses.
+and `write`; its docstring says what the format loses. One without `read` is only written.
 """
 
 from pathlib import Path
@@ -12,11 +12,17 @@ import numpy as np
 
 from ...errors import FileError, GeometryError, ParameterError
 from .. import Geometry
-from . import dat, obj, plot3d, stl, su2, tri, vtp
+from . import dat, glb, obj, plot3d, ply, step, stl, su2, tri, trix, ugrid, vtp, vtu
 from .files import contents, head
 
-FORMATS: tuple[ModuleType, ...] = (tri, stl, obj, vtp, plot3d, su2, dat)
+FORMATS: tuple[ModuleType, ...] = (
+    *(tri, stl, obj, vtp, plot3d, su2, dat),
+    *(ply, ugrid, glb, vtu, trix),
+)
 """Every format, one module each."""
+
+FITTED: tuple[ModuleType, ...] = (step,)
+"""Formats of what is fitted to a geometry and states its unit; they are only written."""
 
 METRES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "ft": 0.3048}
 """Length of each unit [m]."""
@@ -32,7 +38,12 @@ def read(
     With `units` (m, mm, cm, in, ft) lengths become metres; else they stay in the file's unit.
     """
     scale = _metres(units)
-    geometry: Geometry = (_named(format) if format else found(path)).read(path, **options)
+    module = _named(format) if format else found(path)
+    if not hasattr(module, "read"):
+        raise FileError(
+            f"{path}: {module.NAME} is for viewing and only written; read the file it was made from"
+        )
+    geometry: Geometry = module.read(path, **options)
     return geometry if units is None else geometry.moved(np.asarray(geometry.points) * scale)
 
 
@@ -47,23 +58,31 @@ def write(
     """Write a geometry to a file, in the format its name tells.
 
     `format` and `options` are as in `read`; with `units` lengths, which must be metres, are
-    written in that unit.
+    written in that unit. STEP needs it.
     """
     scale = _metres(units)
-    module = _named(format) if format else _by_name(path)
+    module = _named(format) if format else named_by(path)
     if not isinstance(geometry, module.HOLDS):
         raise GeometryError(
             f"{path}: {module.NAME} holds a {module.HOLDS.__name__}, got a "
             f"{type(geometry).__name__}; formats for it: {_known(type(geometry))}"
         )
-    points = np.asarray(geometry.points)
-    bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    check_finite(path, np.asarray(geometry.points), "points")
+    if units is not None:
+        geometry = geometry.moved(np.asarray(geometry.points) / scale)
+    if module in FITTED:
+        options["unit"] = units
+    module.write(path, geometry, **options)
+
+
+def check_finite(path: Path | str, array: np.ndarray, what: str) -> None:
+    """Refuse to write points or derivatives that are no numbers."""
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise GeometryError(
-            f"{path}: {len(bad)} of {len(points)} points are not finite (first: {bad[0]}); "
+            f"{path}: {len(bad)} of {len(array)} {what} are not finite (first: {bad[0]}); "
             "nothing was written"
         )
-    module.write(path, geometry if units is None else geometry.moved(points / scale), **options)
 
 
 def found(path: Path | str) -> ModuleType:
@@ -83,15 +102,16 @@ def found(path: Path | str) -> ModuleType:
     raise FileError(f"{path}: of no known format; known are: {_known()}")
 
 
-def _by_name(path: Path | str) -> ModuleType:
-    for module in FORMATS:
+def named_by(path: Path | str) -> ModuleType:
+    """The format that a file's name tells."""
+    for module in (*FORMATS, *FITTED):
         if _suffix(path) in module.SUFFIXES:
             return module
     raise FileError(f"{path}: the suffix tells no format; known are: {_known()}")
 
 
 def _named(format: str) -> ModuleType:
-    modules = {module.__name__.rpartition(".")[2]: module for module in FORMATS}
+    modules = {module.__name__.rpartition(".")[2]: module for module in (*FORMATS, *FITTED)}
     if format not in modules:
         raise ParameterError(f"no format named {format!r}; known are: {', '.join(modules)}")
     return modules[format]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import FileError
+from ...errors import FileError, GeometryError
 from ..section import Section
 from . import text
 from .files import contents, replacing
@@ -58,14 +58,19 @@ def read(path: Path | str) -> Section:
 def write(path: Path | str, section: Section, lednicer: bool = False) -> None:
     """Write in Selig's order, or in Lednicer's."""
     pairs = np.asarray(section.points)[:, :2]
-    words = section.name.split() or ["section"]
-    if _is_pair([word.encode() for word in words]):
-        words.insert(0, "airfoil")  # two numbers would pass for a point
+    title = text.title(section.name) or b"section"
+    if _is_pair(title.split()):
+        title = b"airfoil " + title  # two numbers would pass for a point
     sides = [pairs]
+    nose = int(np.argmin(pairs[:, 0]))
+    if lednicer and not 0 < nose < len(pairs) - 1:
+        raise GeometryError(
+            f"{path}: point {nose} has the smallest x and is an end of the section, so it has no "
+            "two sides; write it without lednicer=True"
+        )
     with replacing(path) as file:
-        file.write(" ".join(words).encode() + b"\n")
+        file.write(title + b"\n")
         if lednicer:
-            nose = int(np.argmin(pairs[:, 0]))
             sides = [pairs[nose::-1], pairs[nose:]]
             file.write(b"%d. %d.\n" % (len(sides[0]), len(sides[1])))
         for side in sides:

@@ -3,12 +3,14 @@
 import gzip
 import os
 import shutil
+import stat
+import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 from ...errors import FileError
 
@@ -22,6 +24,7 @@ EXPANSION = 256
 def contents(path: Path | str) -> bytes:
     """All bytes of a file, unpacked if they are gzip's."""
     with _told(path, "read"):
+        _check_ordinary(Path(path))
         packed = Path(path).read_bytes()
     if not packed:
         raise FileError(f"{path}: the file is empty; was writing it cut short?")
@@ -30,8 +33,10 @@ def contents(path: Path | str) -> bytes:
 
 def head(path: Path | str) -> bytes:
     """The first bytes of a file, unpacked if they are gzip's."""
-    with _told(path, "read"), Path(path).open("rb") as file:
-        packed = file.read(HEAD)
+    with _told(path, "read"):
+        _check_ordinary(Path(path))
+        with Path(path).open("rb") as file:
+            packed = file.read(HEAD)
     if not _is_gzip(packed):
         return packed
     try:
@@ -41,22 +46,24 @@ def head(path: Path | str) -> bytes:
 
 
 @contextmanager
-def replacing(path: Path | str) -> Iterator[BinaryIO | gzip.GzipFile]:
+def replacing(path: Path | str) -> Iterator[BinaryIO]:
     """A file to write to, which takes the place of `path` when all went well.
 
     It lies beside the target until then, so that a full disk or an error leaves the old file
-    whole. A name that ends in `.gz` is packed.
+    whole. A name that ends in `.gz` is packed; that one can do no more than write.
     """
-    target = Path(os.path.realpath(path))  # a link stays a link
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
     with _told(path, "write"):
-        if target.is_dir():
-            raise IsADirectoryError
+        target = Path(os.path.realpath(path))  # a link stays a link
+        own = f"{os.getpid()}-{threading.get_ident()}"  # others may write the same at this time
+        beside = target.with_name(f".{target.name[:40]}.{own}.part")
+        if target.exists():
+            _check_ordinary(target)
         try:
             with beside.open("wb") as file:
                 if target.suffix == ".gz":
-                    with gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
-                        yield packed
+                    packed = Packed(file)
+                    yield cast(BinaryIO, packed)
+                    packed.finish()
                 else:
                     yield file
             if target.exists():
@@ -66,9 +73,42 @@ def replacing(path: Path | str) -> Iterator[BinaryIO | gzip.GzipFile]:
             beside.unlink(missing_ok=True)
 
 
+class Packed:
+    """A file in gzip's format, which holds nothing back that an error would let out later."""
+
+    def __init__(self, file: BinaryIO):
+        self._file = file
+        self._packer = zlib.compressobj(6, wbits=31)
+
+    def write(self, data: bytes) -> int:
+        """Pack some more."""
+        self._file.write(self._packer.compress(data))
+        return len(data)
+
+    def writelines(self, lines: Iterable[bytes]) -> None:
+        """Pack one after the other."""
+        for line in lines:
+            self.write(line)
+
+    def finish(self) -> None:
+        """Write what is left, and the sum that readers check."""
+        self._file.write(self._packer.flush())
+
+
+def _check_ordinary(path: Path) -> None:
+    """Refuse pipes and devices, which never end or would be replaced by a file."""
+    kind = path.stat().st_mode
+    if stat.S_ISDIR(kind):
+        raise IsADirectoryError
+    if not stat.S_ISREG(kind):
+        raise OSError("is no ordinary file but a pipe or a device; name a file instead")
+
+
 @contextmanager
 def _told(path: Path | str, verb: str) -> Iterator[None]:
     """Turn the system's errors into ours."""
+    if "\0" in str(path):
+        raise FileError(f"{path}: no file can have a name with a NUL in it; check the name")
     try:
         yield
     except FileNotFoundError:
@@ -77,10 +117,12 @@ def _told(path: Path | str, verb: str) -> Iterator[None]:
     except IsADirectoryError:
         raise FileError(f"{path}: is a folder, expected a file; name a file in it") from None
     except PermissionError:
-        raise FileError(f"{path}: no permission to {verb} it; change its owner or mode") from None
-    except OSError as problem:
+        raise FileError(
+            f"{path}: no permission to {verb} it; change its owner or mode, and close it elsewhere"
+        ) from None
+    except (OSError, UnicodeEncodeError) as problem:  # such as half a character in a name
         kept = "" if verb == "read" else "; the old file, if any, is as it was"
-        reason = problem.strerror or str(problem)
+        reason = getattr(problem, "strerror", None) or str(problem)
         raise FileError(f"{path}: cannot {verb} it: {reason.lower()}{kept}") from None
 
 

@@ -8,8 +8,11 @@ Lost on writing: data on points and faces, components without triangles. Coordin
 bit; faces keep their order only within a component.
 """
 
-from itertools import pairwise
+import re
+from array import array
+from io import BytesIO
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +20,19 @@ from ...errors import FileError
 from ..surface import Surface
 from . import text
 from .files import contents, replacing
+from .polygons import fans
 
 NAME = "OBJ"
 SUFFIXES = (".obj",)
 HOLDS = Surface
 
+_NUMBER = re.compile(rb"([+-]?\d{1,15})(?:/|$)")
 _KEYWORDS = {b"v", b"vn", b"vt", b"f", b"g", b"o", b"s", b"mtllib", b"usemtl", b"l", b"p"}
+_IGNORED = set(
+    b"vt vn vp g o s mg l p mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm "
+    b"trim hole scrv sp end con bevel c_interp d_interp lod shadow_obj trace_obj ctech stech call "
+    b"csh".split()
+)
 
 
 def sniff(head: bytes, path: Path | str) -> bool:
@@ -32,24 +42,54 @@ def sniff(head: bytes, path: Path | str) -> bool:
     return text.is_text(head) and b"v" in words and words <= _KEYWORDS
 
 
+class _Faces(NamedTuple):
+    """Polygons without an object for each: a big file has millions."""
+
+    corners: array
+    sizes: array
+    tags: array
+    lines: array
+
+    def add(self, words: bytes, before: int, line: int, tag: int, path: Path | str) -> None:
+        """One more, after so many points; numbers may count back from the last of them."""
+        found = [_NUMBER.match(word) for word in words.split()]
+        if len(found) < 3 or None in found:
+            raise FileError(
+                f"{path}: line {line}: found the face {text.quoted(words)}, expected three or more "
+                "numbers of points such as 1 2 3 or 1/1/1 2/2/2 3/3/3"
+            )
+        numbers = [int(match[1]) for match in found if match]
+        self.corners.extend(k - 1 if k > 0 else before + k if k < 0 else -1 for k in numbers)
+        self.sizes.append(len(found))
+        self.tags.append(tag)
+        self.lines.append(line)
+
+
 def read(path: Path | str) -> Surface:
     """The surface in a file."""
     data = text.unix(contents(path)).replace(b"\\\n", b"  ")
-    points: list[bytes] = []  # an entry per line, so that messages can tell the line
-    faces: list[tuple[int, bytes, int, bytes]] = []
-    name, is_grouped, count = b"1", False, 0
-    for number, line in enumerate(data.split(b"\n"), 1):
+    points, count = bytearray(), 0  # an entry per line, so that messages can tell the line
+    faces = _Faces(array("q"), array("q"), array("q"), array("q"))
+    names: dict[bytes, int] = {}
+    name, is_grouped = b"1", False
+    for number, line in enumerate(BytesIO(data), 1):
         key, *rest = line.split(None, 1) or [b""]
-        points.append(b"")
+        words = rest[0].strip() if rest else b""
         if key == b"v":
-            points[-1] = rest[0] if rest else b"nothing"
+            points += words or b"nothing"
             count += 1
         elif key == b"f":
-            faces.append((number, rest[0] if rest else b"", count, name))
+            faces.add(words, count, number, names.setdefault(name, len(names)), path)
         elif key == b"g" or (key == b"o" and not is_grouped):
             is_grouped = key == b"g"
-            name = rest[0].strip() if rest else b"default"
-    return _surface(_coordinates(b"\n".join(points), path), faces, path)
+            name = words or b"default"
+        elif key not in _IGNORED and key[:1] not in (b"#", b""):
+            raise FileError(
+                f"{path}: line {number}: found {text.quoted(key)}, which is no keyword of OBJ; "
+                "remove the line if it does not matter"
+            )
+        points += b"\n"
+    return _surface(_coordinates(bytes(points), path), faces, names, path)
 
 
 def write(path: Path | str, surface: Surface) -> None:
@@ -58,7 +98,8 @@ def write(path: Path | str, surface: Surface) -> None:
         for lines in text.written(surface.points):
             file.write(b"v " + lines[:-1].replace(b"\n", b"\nv ") + b"\n")
         for number, name in enumerate(surface.components):
-            file.write(b"g " + " ".join(name.split()).encode() + b"\n")
+            title = text.title(name).replace(b"\\", b"/")  # at the end it would join two lines
+            file.write(b"g " + title + b"\n")
             for lines in text.written(surface.faces[surface.tags == number] + 1):
                 file.write(b"f " + lines[:-1].replace(b"\n", b"\nf ") + b"\n")
 
@@ -78,34 +119,16 @@ def _coordinates(data: bytes, path: Path | str) -> np.ndarray:
 
 
 def _surface(
-    points: np.ndarray, faces: list[tuple[int, bytes, int, bytes]], path: Path | str
+    points: np.ndarray, faces: _Faces, names: dict[bytes, int], path: Path | str
 ) -> Surface:
-    triangles: list[tuple[int, int, int]] = []
-    tags: list[int] = []
-    names: dict[str, int] = {}
-    for number, words, before, name in faces:
-        corners = _corners(number, words, before, len(points), path)
-        tag = names.setdefault(text.decoded(name), len(names))
-        for b, c in pairwise(corners[1:]):
-            triangles.append((corners[0], b, c))
-            tags.append(tag)
-    index = np.array(triangles, np.int32).reshape(-1, 3)
-    return Surface(points, index, np.array(tags, np.int32), tuple(names) or ("1",))
-
-
-def _corners(number: int, words: bytes, before: int, count: int, path: Path | str) -> list[int]:
-    """A face's points from 0; numbers may be followed by others, or count back from the last."""
-    try:
-        found = [int(word.partition(b"/")[0]) for word in words.split()]
-    except ValueError:
+    corners, sizes, tags, lines = (np.array(part, np.int64) for part in faces)
+    bad = np.flatnonzero((corners < 0) | (corners >= len(points)))
+    if len(bad):
+        line = lines[np.searchsorted(np.cumsum(sizes), bad[0], side="right")]
         raise FileError(
-            f"{path}: line {number}: found the face {text.decoded(words)!r}, "
-            "expected numbers of points such as 1 2 3 or 1/1/1 2/2/2 3/3/3"
-        ) from None
-    corners = [k - 1 if k > 0 else before + k for k in found]
-    if len(corners) < 3 or min(corners) < 0 or max(corners) >= count or 0 in found:
-        raise FileError(
-            f"{path}: line {number}: the face {text.decoded(words)!r} needs three or more "
-            f"numbers of points, from 1 to {count} or from -1 to {-before}"
+            f"{path}: line {line}: the face needs numbers of points from 1 to {len(points)}, or "
+            "back from -1 to the first point"
         )
-    return corners
+    triangles, owner = fans(corners, sizes)
+    components = tuple(map(text.decoded, names))
+    return Surface(points, triangles, tags[owner], components or ("1",))

@@ -5,11 +5,13 @@ Numbers that only repeat a row's place are not kept; comments in these sections 
 Every other section (control boxes, periodic pairs ...) is kept word for word in `extra` and stands
 behind the mesh when written.
 
-Lost on writing: z of a two-dimensional mesh. Coordinates keep every bit.
+Lost on writing: z of a two-dimensional mesh; `%` in a marker's name becomes `_`. Coordinates keep
+every bit.
 """
 
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,6 +25,9 @@ from .files import contents, replacing
 NAME = "SU2"
 SUFFIXES = (".su2",)
 HOLDS = VolumeMesh
+
+MOST = 2**14
+"""Keywords in a file; each marker has two."""
 
 _KEYWORD = re.compile(rb"^[ \t]*([A-Za-z]\w*)[ \t]*=[ \t]*([^\n]*)$", re.MULTILINE)
 _COMMENT = re.compile(rb"%[^\n]*")
@@ -74,14 +79,17 @@ def write(path: Path | str, mesh: VolumeMesh) -> None:
             file.write((row % (*point, number)).encode())
         file.write(b"NMARK= %d\n" % len(mesh.markers))
         for name, cells in mesh.markers.items():
-            file.write(b"MARKER_TAG= " + name.encode() + b"\n")
+            title = text.title(name).replace(b"%", b"_")  # which begins a comment
+            file.write(b"MARKER_TAG= " + title + b"\n")
             file.write(b"MARKER_ELEMS= %d\n" % len(cells.types))
             file.writelines(_rows(cells, numbered=False))
         file.write(mesh.extra.encode("latin-1"))
 
 
 def sections(data: bytes, path: Path | str) -> Iterator[Section]:
-    found = list(_KEYWORD.finditer(data))
+    found = list(islice(_KEYWORD.finditer(data), MOST + 1))
+    if len(found) > MOST:
+        raise FileError(f"{path}: more than {MOST} keywords, which no mesh has; is it SU2?")
     before = _COMMENT.sub(b"", data[: found[0].start()] if found else data).split()
     if before or not found:
         word = text.quoted(before[0] if before else "nothing")

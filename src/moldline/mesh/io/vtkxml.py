@@ -7,9 +7,11 @@ file cannot grow without bounds.
 
 import base64
 import binascii
+import math
 import re
 import sys
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
@@ -33,7 +35,14 @@ _STRING = "u1"  # letters are held as their codes
 DEPTH = 32
 """Elements within elements; VTK's own files need 6."""
 
+MOST = 2**14
+"""Elements in a file of less than 1 MB; VTK's own have about 20, and 10 more for each piece."""
+
+LEAST = 64
+"""Bytes per element of a longer file, on the average."""
+
 _LINE = ".line"  # no attribute of a file can have this name
+_NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _CLOSE = b"</AppendedData>"
 
 
@@ -45,13 +54,15 @@ class Document:
         data, self._appended = self._cut(data)
         self.root = _parsed(data, path)
         if self.root.tag != "VTKFile":
-            raise FileError(f"{path}: the first element is {self.root.tag!r}, expected 'VTKFile'")
+            raise FileError(
+                f"{path}: the first element is {text.quoted(self.root.tag)}, expected 'VTKFile'"
+            )
         self._order = ">" if self.root.get("byte_order") == "BigEndian" else "<"
         self._size = np.dtype(self._order + ("u8" if self._is_wide() else "u4"))
         self._compressor = self.root.get("compressor")
         if self._compressor not in (None, "", "vtkZLibDataCompressor"):
             raise FileError(
-                f"{path}: data are compressed by {self._compressor}, expected "
+                f"{path}: data are compressed by {text.quoted(self._compressor)}, expected "
                 "vtkZLibDataCompressor; write the file again with zlib or without compression"
             )
         appended = self.root.find("AppendedData")
@@ -64,14 +75,16 @@ class Document:
         value = element.get(attribute, "0").strip()
         if not re.fullmatch("[0-9]{1,15}", value):
             raise FileError(
-                f"{self.place(element)}: {attribute}={value!r} is no whole number of at least 0"
+                f"{self.place(element)}: {attribute}={text.quoted(value)} is no whole number of "
+                "at least 0"
             )
         return int(value)
 
     def place(self, element: Element) -> str:
         """File, line and name of an element, for messages."""
         name = element.get("Name")
-        what = f"{element.tag} {name!r}" if name else element.tag
+        tag = text.quoted(element.tag)[1:-1]
+        what = f"{tag} {text.quoted(name)}" if name else tag
         return f"{self.path}: line {element.get(_LINE)}: {what}"
 
     def array(self, element: Element, rows: int | None = None) -> np.ndarray:
@@ -84,7 +97,8 @@ class Document:
             values = self._binary(element, encoding).astype(kind)
         else:
             raise FileError(
-                f"{self.place(element)}: format {encoding!r}, expected ascii, binary or appended"
+                f"{self.place(element)}: format {text.quoted(encoding)}, expected ascii, binary or "
+                "appended"
             )
         return self._shaped(element, values, rows)
 
@@ -98,23 +112,37 @@ class Document:
         name = element.get("type", "")
         if name not in TYPES and name != "String":
             raise FileError(
-                f"{self.place(element)}: type {name!r}, expected one of {', '.join(TYPES)}"
+                f"{self.place(element)}: type {text.quoted(name)}, expected one of "
+                f"{', '.join(TYPES)}"
             )
         return TYPES.get(name, _STRING)
 
     def _text(self, element: Element, kind: str) -> np.ndarray:
         line = int(element.get(_LINE, "1"))
         found = text.numbers((element.text or "").encode(), self.path, line, finite=False)
-        if element.get("type") == "String":
-            found %= 256  # some write codes of letters with a sign
         with np.errstate(invalid="ignore", over="ignore"):
+            if element.get("type") == "String":
+                found %= 256  # some write codes of letters with a sign
             values = found.astype(kind)
-        if kind[0] != "f" and (values != found).any():
-            raise FileError(
-                f"{self.place(element)}: holds {found[values != found][0]:.15g}, which is no "
-                f"{element.get('type')}"
-            )
+        if kind[0] != "f":
+            is_wrong = values != found
+            if kind[1] == "8":
+                is_wrong |= np.abs(found) >= 2**53  # which a float may have rounded
+            self._mend(values, np.flatnonzero(is_wrong), element)
         return values
+
+    def _mend(self, values: np.ndarray, places: np.ndarray, element: Element) -> None:
+        """Read some whole numbers again without going through floats."""
+        tokens = (element.text or "").split() if len(places) else []
+        for place in places.tolist():
+            token = tokens[place] if len(tokens) == len(values) else "a repeat count"
+            try:
+                values[place] = int(token)
+            except (ValueError, OverflowError):
+                raise FileError(
+                    f"{self.place(element)}: holds {text.quoted(token)}, which is no "
+                    f"{element.get('type')}"
+                ) from None
 
     def _shaped(self, element: Element, values: np.ndarray, rows: int | None) -> np.ndarray:
         components = self.count(element, "NumberOfComponents") or 1
@@ -129,7 +157,9 @@ class Document:
     def _is_wide(self) -> bool:
         kind = self.root.get("header_type", "UInt32")
         if kind not in ("UInt32", "UInt64"):
-            raise FileError(f"{self.path}: header_type {kind!r}, expected UInt32 or UInt64")
+            raise FileError(
+                f"{self.path}: header_type {text.quoted(kind)}, expected UInt32 or UInt64"
+            )
         return kind == "UInt64"
 
     def _cut(self, data: bytes) -> tuple[bytes, bytes]:
@@ -222,20 +252,42 @@ class Document:
         )
 
 
-def data_array(name: str, array: Array) -> bytes:
-    """An element that holds an array, one row per tuple."""
+def data_array(name: str, array: Array, **attributes: str) -> bytes:
+    """An element that holds an array in base64, one row per tuple, with more attributes."""
+    start, array = _declared(name, array, attributes)
+    data = np.uint64(array.nbytes).tobytes() + array.tobytes()
+    return b'%s format="binary">%s</DataArray>\n' % (start, base64.b64encode(data))
+
+
+def text_array(name: str, array: Array, **attributes: str) -> Iterator[bytes]:
+    """The same as text, a line per tuple."""
+    start, array = _declared(name, array, attributes)
+    yield b'%s format="ascii">\n' % start
+    yield from text.written(array.reshape(-1, math.prod(array.shape[1:])))
+    yield b"</DataArray>\n"
+
+
+def _declared(name: str, array: Array, attributes: dict[str, str]) -> tuple[bytes, np.ndarray]:
+    """The beginning of an array's element, and the array in a type that VTK knows."""
     array = np.ascontiguousarray(array)
     if array.dtype.kind == "b":
         array = array.astype(np.uint8)
     kinds = [kind for kind, code in TYPES.items() if np.dtype(code) == array.dtype]
-    if not kinds:
-        raise FileError(f"data {name!r} of type {array.dtype} cannot be written, expected numbers")
-    components = array.size // max(len(array), 1) if array.ndim > 1 else 1
-    data = np.uint64(array.nbytes).tobytes() + array.tobytes()
-    return (
-        f'<DataArray type="{kinds[0]}" Name={quoteattr(name)} '
-        f'NumberOfComponents="{components}" format="binary">'
-    ).encode() + b"%s</DataArray>\n" % base64.b64encode(data)
+    components = math.prod(array.shape[1:])
+    if not kinds or not components:
+        what = f"of type {array.dtype}" if components else "with no number per point or face"
+        raise FileError(f"data {name!r} {what} cannot be written, expected numbers")
+    more = "".join(f" {key}={attribute(value)}" for key, value in attributes.items())
+    start = (
+        f'<DataArray type="{kinds[0]}" Name={attribute(name)} '
+        f'NumberOfComponents="{components}"{more}'
+    )
+    return start.encode(), array
+
+
+def attribute(value: str) -> str:
+    """A value in quotation marks; a `?` stands for what XML cannot hold."""
+    return quoteattr(_NO_XML.sub("?", value))
 
 
 def opening(kind: str) -> bytes:
@@ -247,38 +299,52 @@ def opening(kind: str) -> bytes:
     ).encode()
 
 
-def _parsed(data: bytes, path: Path | str) -> Element:
-    builder, parser, depth = TreeBuilder(), expat.ParserCreate(), 0
+class _Parser:
+    """Builds the tree of elements, each with its line, and refuses what makes a file explode."""
 
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
-        line = parser.CurrentLineNumber
-        if depth > DEPTH:
-            raise FileError(f"{path}: line {line}: more than {DEPTH} elements within each other")
-        builder.start(tag, attributes | {_LINE: str(line)})
+    def __init__(self, path: Path | str, size: int):
+        self.path, self.depth, self.count = path, 0, 0
+        self.most = max(MOST, size // LEAST)
+        self.builder, self.expat = TreeBuilder(), expat.ParserCreate()
+        self.expat.buffer_text = True
+        self.expat.buffer_size = 2**20
+        self.expat.StartElementHandler = self.start
+        self.expat.EndElementHandler = self.end
+        self.expat.CharacterDataHandler = self.builder.data
+        self.expat.StartDoctypeDeclHandler = self.refuse
 
-    def end(tag: str) -> None:
-        nonlocal depth
-        depth -= 1
-        builder.end(tag)
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        line = self.expat.CurrentLineNumber
+        self.depth += 1
+        self.count += 1
+        if self.depth > DEPTH:
+            raise FileError(
+                f"{self.path}: line {line}: more than {DEPTH} elements within each other"
+            )
+        if self.count > self.most:
+            raise FileError(
+                f"{self.path}: line {line}: more than {self.most} elements; is it a mesh?"
+            )
+        self.builder.start(tag, attributes | {_LINE: str(line)})
 
-    def refuse(*_: object) -> None:
+    def end(self, tag: str) -> None:
+        self.depth -= 1
+        self.builder.end(tag)
+
+    def refuse(self, *_: object) -> None:
         raise FileError(
-            f"{path}: line {parser.CurrentLineNumber}: found a document type, which VTK files do "
-            "not have; remove it"
+            f"{self.path}: line {self.expat.CurrentLineNumber}: found a document type, which VTK "
+            "files do not have; remove it"
         )
 
-    parser.buffer_text = True
-    parser.buffer_size = 2**20
-    parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CharacterDataHandler = builder.data
-    parser.StartDoctypeDeclHandler = refuse
+
+def _parsed(data: bytes, path: Path | str) -> Element:
+    parser = _Parser(path, len(data))
     try:
-        parser.Parse(data, True)
+        parser.expat.Parse(data, True)
     except expat.ExpatError as problem:
         raise FileError(
             f"{path}: line {problem.lineno}: {expat.ErrorString(problem.code)}, expected XML; "
             "was the copy cut short?"
         ) from None
-    return builder.close()
+    return parser.builder.close()

@@ -14,11 +14,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..._types import Array
 from ...errors import FileError
 from ..surface import Surface
-from . import text
+from . import vtkpieces
 from .files import contents, replacing
+from .polygons import fans
 from .vtkxml import Document, data_array, opening
 
 NAME = "VTP"
@@ -34,24 +34,17 @@ def sniff(head: bytes, path: Path | str) -> bool:
 def read(path: Path | str) -> Surface:
     """The surface in a file."""
     document = Document(contents(path), path)
-    mesh = document.root.find("PolyData")
-    if mesh is None:
-        raise FileError(
-            f"{path}: holds {document.root.get('type')!r}, expected 'PolyData'; "
-            "extract its surface first"
-        )
-    pieces = [_piece(document, piece) for piece in mesh.findall("Piece")]
-    if not pieces:
-        raise FileError(f"{path}: PolyData has no Piece, so there is nothing to read")
-    before = np.cumsum([0] + [len(piece.points) for piece in pieces])
-    face_data = _merged([piece.face_data for piece in pieces])
-    tags, components = _components(face_data.pop("component", None), _names(document, mesh), path)
+    parts = [_piece(document, piece) for piece in vtkpieces.pieces(document, "PolyData")]
+    before = np.cumsum([0] + [len(part.points) for part in parts])
+    face_data = vtkpieces.merged([part.face_data for part in parts], path)
+    names = vtkpieces.names(document, vtkpieces.COMPONENTS)
+    tags, components = vtkpieces.components(face_data.pop("component", None), names, path)
     return Surface(
-        np.concatenate([piece.points for piece in pieces]),
-        np.concatenate([p.faces + start for p, start in zip(pieces, before[:-1], strict=True)]),
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([p.faces + start for p, start in zip(parts, before[:-1], strict=True)]),
         tags,
         components,
-        _merged([piece.point_data for piece in pieces]),
+        vtkpieces.merged([part.point_data for part in parts], path),
         face_data,
     )
 
@@ -61,7 +54,8 @@ def write(path: Path | str, surface: Surface) -> None:
     points, faces = np.asarray(surface.points), np.asarray(surface.faces)
     with replacing(path) as file:
         file.write(opening("PolyData"))
-        file.write(b"<FieldData>\n" + _name_array(surface.components) + b"</FieldData>\n")
+        names = vtkpieces.name_array(vtkpieces.COMPONENTS, surface.components)
+        file.write(b"<FieldData>\n" + names + b"</FieldData>\n")
         file.write(
             b'<Piece NumberOfPoints="%d" NumberOfVerts="0" NumberOfLines="0" NumberOfStrips="0" '
             b'NumberOfPolys="%d">\n' % (len(points), len(faces))
@@ -78,89 +72,18 @@ def write(path: Path | str, surface: Surface) -> None:
 
 
 def _piece(document: Document, piece: Element) -> Surface:
-    place = document.place(piece)
-    count = document.count(piece, "NumberOfPoints")
     if document.count(piece, "NumberOfStrips"):
-        raise FileError(f"{place} has triangle strips, expected polygons; triangulate it first")
-    holder = piece.find("Points/DataArray")
-    points = np.empty((0, 3)) if holder is None else document.array(holder, count)
-    if points.shape != (count, 3) or not np.isfinite(points).all():
-        raise FileError(f"{place} needs {count} points of three finite coordinates")
-    triangles, owner = _triangles(document, piece, count)
+        raise FileError(
+            f"{document.place(piece)} has triangle strips, expected polygons; triangulate it first"
+        )
+    points = vtkpieces.coordinates(document, piece)
+    corners, sizes = vtkpieces.cells(document, piece, "Polys", len(points), least=3)
+    triangles, owner = fans(corners, sizes)
     skipped = document.count(piece, "NumberOfVerts") + document.count(piece, "NumberOfLines")
-    cells = skipped + document.count(piece, "NumberOfPolys")
-    face_data = document.arrays(piece.find("CellData"), cells)
+    face_data = vtkpieces.data(document, piece, "CellData", skipped + len(sizes))
     return Surface(
-        points.astype(np.float64),
+        points,
         triangles,
-        point_data=document.arrays(piece.find("PointData"), count),
+        point_data=vtkpieces.data(document, piece, "PointData", len(points)),
         face_data={name: data[skipped:][owner] for name, data in face_data.items()},
     )
-
-
-def _triangles(document: Document, piece: Element, points: int) -> tuple[np.ndarray, np.ndarray]:
-    """Triangles of all polygons, and the polygon each comes from."""
-    count = document.count(piece, "NumberOfPolys")
-    polygons = piece.find("Polys")
-    found = {} if polygons is None else {e.get("Name"): e for e in polygons.findall("DataArray")}
-    if not count:
-        return np.empty((0, 3), np.int32), np.empty(0, np.int64)
-    if not {"connectivity", "offsets"} <= found.keys():
-        raise FileError(f"{document.place(piece)}: Polys need the arrays connectivity and offsets")
-    ends = document.array(found["offsets"], count).astype(np.int64)
-    place = document.place(found["connectivity"])
-    corners = text.indices(
-        document.array(found["connectivity"]),
-        points,
-        document.path,
-        lambda row: f"{place.removeprefix(f'{document.path}: ')}, entry {row + 1},",
-        base=0,
-    )
-    sizes = np.diff(ends, prepend=0)
-    if ends[-1] != len(corners) or (sizes < 3).any():
-        raise FileError(
-            f"{document.place(found['offsets'])}: offsets must rise by 3 or more, up to the "
-            f"{len(corners)} entries of connectivity"
-        )
-    owner = np.repeat(np.arange(count), sizes - 2)
-    first = (ends - sizes)[owner]
-    second = first + 1 + np.arange(len(owner)) - (np.cumsum(sizes - 2) - (sizes - 2))[owner]
-    return np.stack([corners[first], corners[second], corners[second + 1]], axis=1), owner
-
-
-def _merged(data: list[dict[str, Array]]) -> dict[str, np.ndarray]:
-    """Arrays that all pieces have, one after the other."""
-    shared = [name for name in data[0] if all(name in other for other in data)]
-    return {name: np.concatenate([other[name] for other in data]) for name in shared}
-
-
-def _names(document: Document, mesh: Element) -> tuple[str, ...]:
-    """Names of components, which are written as codes of letters with a 0 after each name."""
-    for element in mesh.findall("FieldData/Array"):
-        if element.get("Name") == "component_names":
-            names = document.array(element).tobytes().split(b"\0")[:-1]
-            return tuple(text.decoded(name) for name in names)
-    return ()
-
-
-def _components(
-    labels: np.ndarray | None, names: tuple[str, ...], path: Path | str
-) -> tuple[np.ndarray | None, tuple[str, ...] | None]:
-    """Tags and names: the names' own numbers, or one component per different number."""
-    if labels is None:
-        return None, None
-    if labels.ndim != 1:
-        raise FileError(f"{path}: the cell array 'component' needs one number per cell")
-    if names:
-        count = len(names)
-        return text.indices(labels, count, path, lambda row: f"component of face {row}", 0), names
-    found, tags = np.unique(labels, return_inverse=True)
-    return tags, tuple(f"{label:g}" for label in found.tolist())
-
-
-def _name_array(names: tuple[str, ...]) -> bytes:
-    codes = b"".join(name.encode() + b"\0" for name in names)
-    return (
-        f'<Array type="String" Name="component_names" NumberOfTuples="{len(names)}" '
-        f'format="ascii">{" ".join(map(str, codes))}</Array>\n'
-    ).encode()

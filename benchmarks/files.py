@@ -1,0 +1,123 @@
+"""Time to read and write binary files, beside `cp` of the same file in the same run.
+
+usage: python benchmarks/files.py [--markdown] [--sizes 1000000 10000000]
+
+`x` are multiples of `cp`; files lie in memory's cache, as after a first read. `stream` is
+`moldline deform --stream` with a lattice of 10 x 10 x 10, file to file, its start-up included.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from deform import line, surface_points, told
+
+import moldline as ml
+
+SIZES = (1_000_000, 10_000_000)
+COLUMNS = ("points", "file", "MB", "cp [s]", "read [s]", "x", "write [s]", "x ", "stream [s]")
+
+FILES: dict[str, dict[str, Any]] = {
+    "a.i.tri": {"binary": "little"},
+    "big.i.tri": {"binary": "big", "records": True},
+    "a.xyz": {"binary": "little"},
+    "a.ply": {},
+    "a.stl": {"binary": True},
+    "a.lb8.ugrid": {},
+}
+
+CASE = """\
+moldline = 1
+[geometry.a]
+file = "{file}"
+[variable.lift]
+size = 10
+value = 0.01
+[[stage]]
+deformer = "lattice"
+shape = [10, 10, 10]
+[[stage.link]]
+variable = "lift"
+link = "camber"
+along = "x"
+axis = "z"
+"""
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
+    parser.add_argument("--markdown", action="store_true", help="a table for the docs")
+    given = parser.parse_args()
+    separator = " | " if given.markdown else "  "
+    widths = [max(len(name), 12) for name in COLUMNS]
+    line(COLUMNS, widths, separator, given.markdown)
+    if given.markdown:
+        line(["---:"] * len(COLUMNS), widths, separator, True)
+    for size in given.sizes:
+        for name, options in FILES.items():
+            row = measured(size, name, options)
+            line([told(row.get(column)) for column in COLUMNS], widths, separator, given.markdown)
+
+
+def measured(size: int, name: str, options: dict[str, Any]) -> dict[str, float | str]:
+    """One row."""
+    geometry = made(size, name)
+    with tempfile.TemporaryDirectory() as folder:
+        path, copy = Path(folder) / name, Path(folder) / f"copy.{name}"
+        write = best(lambda: ml.write(path, geometry, **options))
+        del geometry
+        cp = best(lambda: shutil.copyfile(path, copy))
+        read = best(lambda: ml.read(path))
+        row: dict[str, float | str] = {
+            "points": size, "file": name, "MB": path.stat().st_size / 1e6, "cp [s]": cp,
+            "read [s]": read, "x": read / cp, "write [s]": write, "x ": write / cp,
+        }  # fmt: skip
+        if not name.endswith(("ply", "ugrid")):
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE.format(file=name))
+            command = [sys.executable, "-m", "moldline", "deform", case, "--stream", "-o", copy]
+            start = time.perf_counter()
+            subprocess.run(command, check=True, capture_output=True)
+            row["stream [s]"] = time.perf_counter() - start
+        return row
+
+
+def made(size: int, name: str) -> ml.Geometry:
+    """A geometry that the file can hold."""
+    points = surface_points(size)
+    rows = int(np.sqrt(size / 2))
+    grid = ml.Grid(points, ((2 * rows, rows, 1),))
+    if name.endswith("xyz"):
+        return grid
+    surface = ml.Surface(points, grid.faces)
+    if not name.endswith("ugrid"):
+        return surface
+    from moldline.mesh.volume import Cells
+
+    faces = np.asarray(surface.faces)
+    cells = Cells(np.full(len(faces), 5), np.arange(0, 3 * len(faces) + 1, 3), faces.ravel())
+    tetra = Cells(np.array([10]), np.array([0, 4]), np.arange(4))
+    return ml.VolumeMesh(points, tetra, {"1": cells})
+
+
+def best(call: Callable[[], object], repeats: int = 3) -> float:
+    """The shortest of a few times [s]: files are disturbed more than they vary."""
+    times = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        call()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+if __name__ == "__main__":
+    main()

@@ -122,6 +122,7 @@ def test_components_are_named_by_blocks():
     [
         ({"wing": [7]}, "component 'wing' names block 7; the grid has blocks 1 to 6"),
         ({"wing": [0]}, "names block 0"),
+        ({"wing": []}, "component 'wing' names no block"),
         ({"wing": [1], "body": [1]}, "block 1 belongs to 'wing' and 'body'; name it once"),
     ],
 )

@@ -1,6 +1,7 @@
 """`moldline convert`."""
 
 import argparse
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ EXAMPLE = """\
   moldline convert inv_ONERAM6_ffd.cfg case.toml     (an SU2 case with FFD boxes)"""
 
 UNITS = ("m", "cm", "mm", "in", "ft")
+
+_BLOCKS = re.compile(r"\d{1,6}(-\d{1,6})?(,\d{1,6}(-\d{1,6})?)*")
 
 
 def configure(command: argparse.ArgumentParser) -> None:
@@ -130,14 +133,11 @@ def _blocks(given: list[str]) -> dict[str, list[int]]:
     named: dict[str, list[int]] = {}
     for text in given:
         name, _, blocks = text.partition("=")
-        try:
-            ends = [tuple(map(int, part.split("-"))) for part in blocks.split(",")]
-            numbers = [k for one, *other in ends for k in range(one, (other or [one])[0] + 1)]
-        except ValueError:
-            numbers = []
-        if not name or not numbers:
+        if not name or not _BLOCKS.fullmatch(blocks):
             raise ParameterError(f"--component {text!r}: expected NAME=BLOCKS, e.g. wing=3-6,17")
-        named.setdefault(name, []).extend(numbers)
+        for part in blocks.split(","):
+            first, _, last = part.partition("-")
+            named.setdefault(name, []).extend(range(int(first), int(last or first) + 1))
     return named
 
 

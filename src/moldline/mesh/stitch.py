@@ -125,6 +125,8 @@ def named(
     """The component of each block, and their names."""
     owner: dict[int, str] = {}
     for name, blocks in components.items():
+        if not len(blocks):
+            raise ParameterError(f"component {name!r} names no block; give one or more")
         for number in blocks:
             if not 1 <= number <= count:
                 raise ParameterError(

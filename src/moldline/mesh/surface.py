@@ -90,11 +90,11 @@ def as_points(points: ArrayLike) -> Array:
 def check_indices(indices: Array, count: int, what: str) -> None:
     """Refuse indices outside 0 .. count - 1."""
     indices = np.asarray(indices)
+    if not indices.size or (indices.min() >= 0 and indices.max() < count):
+        return
     bad = np.argwhere((indices < 0) | (indices >= count))
-    if len(bad):
-        row = int(bad[0, 0])
-        value = int(indices[tuple(bad[0])])
-        raise GeometryError(f"{what} {row} refers to {value}, but there are only {count} (from 0)")
+    row, value = int(bad[0, 0]), int(indices[tuple(bad[0])])
+    raise GeometryError(f"{what} {row} refers to {value}, but there are only {count} (from 0)")
 
 
 def check_lengths(data: Mapping[str, Array], count: int, what: str) -> None:

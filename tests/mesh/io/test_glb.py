@@ -124,7 +124,7 @@ def test_any_surface_keeps_its_triangles_and_names(tmp_path, seed):
 
 def test_it_is_not_read_and_says_what_to_do(tmp_path):
     io.write(tmp_path / "a.glb", ROOF)
-    message = r"a\.glb: GLB is for viewing and only written; read the file it was made from"
+    message = r"a\.glb: GLB is only written; read the file that it was made from"
     with pytest.raises(FileError, match=message):
         io.read(tmp_path / "a.glb")
     with pytest.raises(FileError, match=message):

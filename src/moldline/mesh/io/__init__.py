@@ -41,7 +41,7 @@ def read(
     module = _named(format) if format else found(path)
     if not hasattr(module, "read"):
         raise FileError(
-            f"{path}: {module.NAME} is for viewing and only written; read the file it was made from"
+            f"{path}: {module.NAME} is only written; read the file that it was made from"
         )
     geometry: Geometry = module.read(path, **options)
     return geometry if units is None else geometry.moved(np.asarray(geometry.points) * scale)
@@ -77,12 +77,13 @@ def write(
 
 def check_finite(path: Path | str, array: np.ndarray, what: str) -> None:
     """Refuse to write points or derivatives that are no numbers."""
+    if np.isfinite(array).all():
+        return
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
-    if len(bad):
-        raise GeometryError(
-            f"{path}: {len(bad)} of {len(array)} {what} are not finite (first: {bad[0]}); "
-            "nothing was written"
-        )
+    raise GeometryError(
+        f"{path}: {len(bad)} of {len(array)} {what} are not finite (first: {bad[0]}); "
+        "nothing was written"
+    )
 
 
 def found(path: Path | str) -> ModuleType:
@@ -93,7 +94,9 @@ def found(path: Path | str) -> ModuleType:
     fitting = [module for module in FORMATS if module.sniff(begin, path)]
     if len(fitting) == 1:
         return fitting[0]
-    named = [module for module in fitting or FORMATS if _suffix(path) in module.SUFFIXES]
+    named = [
+        module for module in fitting or (*FORMATS, *FITTED) if _suffix(path) in module.SUFFIXES
+    ]
     if len(named) == 1:
         return named[0]
     if fitting:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..._types import Array
 from ...errors import FileError, ParameterError
+from .files import Bytes
 
 
 class Part(NamedTuple):
@@ -42,7 +43,7 @@ class Layout(NamedTuple):
         """Bytes that a file of these parts has."""
         return sum(p.length * self.type(p.kind).itemsize + 8 * self.records for p in parts)
 
-    def integers(self, data: bytes, record: int, count: int) -> list[int] | None:
+    def integers(self, data: Bytes, record: int, count: int) -> list[int] | None:
         """The first integers of a file, if its first record is of `record` integers."""
         skip = 4 * self.records
         end = 4 * record + skip
@@ -55,7 +56,7 @@ class Layout(NamedTuple):
             return None
         return values
 
-    def split(self, data: bytes, parts: Sequence[Part], path: Path | str) -> list[np.ndarray]:
+    def split(self, data: Bytes, parts: Sequence[Part], path: Path | str) -> list[np.ndarray]:
         """The parts of a file whose size is right, as arrays of this machine's byte order."""
         arrays, at = [], 0
         for part in parts:
@@ -76,14 +77,18 @@ class Layout(NamedTuple):
         dtype = self.type(parts[number].kind)
         return data[begin : begin + parts[number].length * dtype.itemsize].view(dtype)
 
-    def joined(self, arrays: Sequence[Array], path: Path | str) -> Iterator[bytes]:
+    def joined(self, arrays: Sequence[Array], path: Path | str) -> Iterator[Bytes]:
         """The bytes of a file of these arrays."""
         for array in arrays:
             values = narrowed(array, self.type("f" if array.dtype.kind == "f" else "i"), path)
             marker = np.array(values.nbytes, f"{self.order}i4").tobytes() if self.records else b""
-            yield from (marker, values.tobytes(), marker)
+            yield from (
+                marker,
+                np.ascontiguousarray(values).reshape(-1).view(np.uint8).data,
+                marker,
+            )
 
-    def _check_markers(self, data: bytes, at: int, size: int, path: Path | str) -> None:
+    def _check_markers(self, data: Bytes, at: int, size: int, path: Path | str) -> None:
         for place in (at, at + 4 + size):
             found = int(np.frombuffer(data, f"{self.order}i4", 1, place)[0])
             if found != size:

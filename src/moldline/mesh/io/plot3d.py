@@ -27,7 +27,7 @@ from ..grid import Grid
 from . import binary as layouts
 from . import text
 from .binary import Fit, Layout, Part
-from .files import HEAD, contents, replacing
+from .files import HEAD, Bytes, loaded, replacing
 from .mapped import Run
 
 NAME = "PLOT3D"
@@ -77,10 +77,11 @@ def sniff(head: bytes, path: Path | str) -> bool:
 
 def read(path: Path | str) -> Grid:
     """The blocks in a file, whichever variant it is."""
-    data = contents(path)
+    data = loaded(path)
     if text.is_text(data[:4096]):
-        values = text.numbers(data, path)
-        header = _fitting(_text_headers(values, data), values, path)
+        letters = bytes(data)
+        values = text.numbers(letters, path)
+        header = _fitting(_text_headers(values, letters), values, path)
         ends = np.cumsum([p.length for p in header.parts])
         blocks = np.split(values, ends)[len(header.lengths) : -1]
         return _grid([p.reshape(header.coordinates, -1) for p in blocks], header.shapes, path)
@@ -111,7 +112,7 @@ def write(
     blocks = [block.T.ravel() for block in np.split(points, ends)]
     arrays = [np.array([len(blocks)]), np.array(grid.shapes), *blocks]
     if binary is None:
-        pieces: Iterator[bytes] = (line for array in arrays for line in _lines(array))
+        pieces: Iterator[Bytes] = (line for array in arrays for line in _lines(array))
     else:
         pieces = layouts.chosen(binary, records, precision).joined(arrays, path)
     with replacing(path) as file:
@@ -189,7 +190,7 @@ def _fitting(headers: list[Header], values: np.ndarray, path: Path | str) -> Hea
     )
 
 
-def _binary_headers(data: bytes, layout: Layout) -> Iterator[Header]:
+def _binary_headers(data: Bytes, layout: Layout) -> Iterator[Header]:
     """As `_headers`, for one layout of binary data."""
     ranks = (3, 2) if layout.records else (3,)
     count = layout.integers(data, 1, 1)
@@ -209,7 +210,7 @@ def _binary_headers(data: bytes, layout: Layout) -> Iterator[Header]:
             yield from (h for h in _headers(np.array(found)) if h.lengths == (rank,))
 
 
-def _fits(data: bytes) -> list[Fit]:
+def _fits(data: Bytes) -> list[Fit]:
     """Every way to understand the header as a binary one."""
     fits = [
         Fit(layout, header.parts, str(header))
@@ -219,7 +220,7 @@ def _fits(data: bytes) -> list[Fit]:
     return layouts.likely(fits)
 
 
-def _are_halves(data: bytes, fit: Fit) -> bool:
+def _are_halves(data: Bytes, fit: Fit) -> bool:
     """Whether 4-byte floats are rather the halves of 8-byte ones.
 
     Neighbours in a grid are alike; the two halves of a float know nothing of each other.

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..._types import Array
 from ...errors import FileError
-from .files import EXPANSION, HEAD
+from .files import EXPANSION, HEAD, Bytes
 
 LARGEST = 2**18
 """Numbers that repeat counts may stand for in a file that is itself shorter than this."""
@@ -66,6 +66,9 @@ def indices(
 
     `place` says where a row of `values` stands, for the error message.
     """
+    is_whole = values.dtype.kind in "iu" and len(values) > 0
+    if is_whole and base <= values.min() and values.max() < count + base:
+        return np.subtract(values, base, dtype=np.int32, casting="unsafe")
     good = (values >= base) & (values < count + base) & (values == np.floor(values))
     if not good.all():
         found = np.argwhere(~good)[0]
@@ -119,7 +122,7 @@ def quoted(found: bytes | str) -> str:
     return repr(word if len(word) <= 60 else word[:57] + "...")
 
 
-def is_text(head: bytes) -> bool:
+def is_text(head: Bytes) -> bool:
     """Whether the bytes hold no control characters but white space."""
     return re.search(rb"[\x00-\x08\x0e-\x1f]", head) is None
 

@@ -23,7 +23,7 @@ from ..surface import Surface
 from . import binary as layouts
 from . import text
 from .binary import Fit, Part
-from .files import contents, replacing
+from .files import Bytes, loaded, replacing
 from .mapped import Run
 
 NAME = "Cart3D tri"
@@ -77,9 +77,9 @@ def sniff(head: bytes, path: Path | str) -> bool:
 
 def read(path: Path | str) -> Surface:
     """The triangulation in a file, whichever variant it is."""
-    data = contents(path)
+    data = loaded(path)
     if text.is_text(data[:4096]):
-        return _read_text(data, path)
+        return _read_text(bytes(data), path)
     fit = layouts.fitting(_fits(data), len(data), path)
     header, *parts = fit.layout.split(data, fit.parts, path)
     scalars = int(header[2]) if len(header) == 3 else 0
@@ -108,7 +108,7 @@ def write(
     with replacing(path) as file:
         if binary is None:
             file.write(" ".join(map(str, header)).encode() + b"\n")
-            pieces: Iterator[bytes] = (line for array in arrays for line in text.written(array))
+            pieces: Iterator[Bytes] = (line for array in arrays for line in text.written(array))
         else:
             layout = layouts.chosen(binary, records, precision)
             pieces = layout.joined([np.array(header), *arrays], path)
@@ -122,7 +122,7 @@ def runs(data: np.ndarray, path: Path | str) -> list[Run]:
     return [Run(fit.layout.view(data, fit.parts, 1).reshape(-1, 1, 3))]
 
 
-def _fits(data: bytes) -> list[Fit]:
+def _fits(data: Bytes) -> list[Fit]:
     """Every way to understand the header as a binary one."""
     fits = []
     for layout in layouts.LAYOUTS:
@@ -184,13 +184,22 @@ def _surface(counts: Counts, parts: list[np.ndarray], path: Path | str) -> Surfa
         ids = parts[2]
         if (ids != np.floor(ids)).any():
             raise FileError(f"{path}: component ids must be whole numbers, found {ids.max():.15g}")
-        names, tags = np.unique(ids.astype(np.int64), return_inverse=True)
+        names, tags = distinct(ids.astype(np.int64))
         components = tuple(map(str, names.tolist()))
     data = {}
     if counts.scalars:
         columns = parts[-1].reshape(len(points), -1).T
         data = {f"q{i}" if i > 1 else "Cp": column for i, column in enumerate(columns, 1)}
     return Surface(points, faces, tags, components, data)
+
+
+def distinct(ids: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different whole numbers, ascending, and for each of all the place of its own there."""
+    low, high = int(ids.min()), int(ids.max())
+    if high - low > len(ids):
+        return np.unique(ids, return_inverse=True)
+    is_used = np.bincount(ids - low) > 0
+    return np.flatnonzero(is_used) + low, (np.cumsum(is_used) - 1)[ids - low]
 
 
 def whole_ids(components: tuple[str, ...]) -> np.ndarray:

@@ -25,7 +25,7 @@ from ..volume import NODES_PER_CELL, Cells, VolumeMesh
 from . import binary as layouts
 from . import text
 from .binary import LAYOUTS, Fit, Layout, Part
-from .files import contents, replacing
+from .files import Bytes, loaded, replacing
 from .tri import whole_ids
 
 NAME = "UGRID"
@@ -98,8 +98,8 @@ def sniff(head: bytes, path: Path | str) -> bool:
 
 def read(path: Path | str) -> VolumeMesh:
     """The mesh in a file, whichever variant it is."""
-    data = contents(path)
-    parts = _from_text(data, path) if text.is_text(data[:4096]) else _from_binary(data, path)
+    data = loaded(path)
+    parts = _from_text(bytes(data), path) if text.is_text(data[:4096]) else _from_binary(data, path)
     points = parts[0].reshape(-1, 3)
     if not np.isfinite(points).all():
         row = int(np.argwhere(~np.isfinite(points))[0, 0])
@@ -137,7 +137,7 @@ def _named(path: Path | str) -> Layout | None:
     return Layout("<" if found[1] else ">", found[2] in "rR", int(found[3]))
 
 
-def _headers(data: bytes, path: Path | str) -> Iterator[tuple[Layout, Counts]]:
+def _headers(data: Bytes, path: Path | str) -> Iterator[tuple[Layout, Counts]]:
     """Every way to understand the header as a binary one, that of the name first."""
     named = _named(path)
     for layout in sorted(LAYOUTS, key=lambda layout: layout != named):
@@ -146,7 +146,7 @@ def _headers(data: bytes, path: Path | str) -> Iterator[tuple[Layout, Counts]]:
             yield layout, Counts(*header)
 
 
-def _fits(data: bytes, path: Path | str) -> list[Fit]:
+def _fits(data: Bytes, path: Path | str) -> list[Fit]:
     """Every way to understand the whole file; marks of records count as parts."""
     fits = []
     for layout, counts in _headers(data, path):
@@ -159,7 +159,7 @@ def _fits(data: bytes, path: Path | str) -> list[Fit]:
     return fits
 
 
-def _from_binary(data: bytes, path: Path | str) -> list[np.ndarray]:
+def _from_binary(data: Bytes, path: Path | str) -> list[np.ndarray]:
     """Points, triangles, quads, their numbers, and the four kinds of cells."""
     fits = _fits(data, path)
     if not any(fit.size == len(data) for fit in fits):

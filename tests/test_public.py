@@ -7,9 +7,9 @@ import moldline as ml
 
 PUBLIC = {
     "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "Cloud", "ControlVolume",
-    "Geometry", "Grid", "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage", "Surface", "Variable",
-    "VolumeMesh", "errors", "links", "load", "plot", "read", "variable", "write",
-    "read_sensitivities", "write_sensitivities",
+    "Geometry", "Grid", "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage",
+    "Surface", "Variable", "VolumeMesh", "errors", "links", "load", "plot", "read",
+    "read_sensitivities", "variable", "write", "write_sensitivities",
 }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ def shown():
     for page in sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]):
         for block in re.findall(r"```console\n(.*?)```", page.read_text(), re.S):
             for part in re.split(r"^\$ ", block, flags=re.M)[1:]:
-                command, *lines = part.rstrip("\n").split("\n")
+                command, *lines = part.rstrip("\n").replace("\\\n", " ").split("\n")
                 words = shlex.split(command, comments=True)
                 if words[0] == "moldline" and any(w.startswith("examples/") for w in words):
                     yield pytest.param(words[1:], lines, id=f"{page.stem}-{' '.join(words[1:3])}")

@@ -10,7 +10,7 @@ import moldline as ml
 from moldline.errors import FileError, GeometryError, ParameterError
 from moldline.mesh import Grid
 from moldline.mesh.fit import fitted, lofted
-from moldline.mesh.io import found, read, step, write
+from moldline.mesh.io import read, step, write
 
 WING = {"wing": [*range(3, 7), *range(9, 13), 17, 18], "body": [1, 2, 7, 8, *range(13, 17)]}
 
@@ -173,8 +173,8 @@ def test_writing_by_name_states_the_unit(occ, tmp_path):
     assert "SI_UNIT(.MILLI.,.METRE.)" in (tmp_path / "a.stp").read_text()
     with pytest.raises(ParameterError, match="states its unit of length, got None; name one of m"):
         ml.write(tmp_path / "b.stp", grid)
-    with pytest.raises(FileError, match="of no known format"):
-        found(tmp_path / "a.stp")
+    with pytest.raises(FileError, match="STEP is only written"):
+        ml.read(tmp_path / "a.stp")
 
 
 def test_a_failure_leaves_the_old_file(occ, tmp_path):

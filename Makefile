@@ -40,8 +40,10 @@ check: .venv/ready-dev  ## format, lint, types, layers, tests
 slow: .venv/ready  ## everything at full size
 	@$(BIN)/python -m pytest
 
-bench: .venv/ready  ## the benchmark table
+bench: .venv/ready  ## the benchmark tables: deformation, embedding, files
 	@$(BIN)/python benchmarks/deform.py
+	@$(BIN)/python benchmarks/embedding.py
+	@$(BIN)/python benchmarks/files.py
 
 docs: .venv/ready-dev  ## the documentation, into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet

@@ -7,11 +7,11 @@ it. `deform/lattice` compares with a lattice of the same counts on the same poin
 pyGeo's times are those of version 1.17 on one core of such a machine, measured once, straight box.
 """
 
-import argparse
 import time
 
 import numpy as np
-from deform import line, median, told
+import table
+from table import median
 
 import moldline as ml
 from moldline.deformers.volume_frame import Box
@@ -28,19 +28,9 @@ COLUMNS = (
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
-    parser.add_argument("--markdown", action="store_true", help="a table for the docs")
-    given = parser.parse_args()
-    separator = " | " if given.markdown else "  "
-    widths = [max(len(name), 8) for name in COLUMNS]
-    line(COLUMNS, widths, separator, given.markdown)
-    if given.markdown:
-        line(["---:"] * len(COLUMNS), widths, separator, True)
-    for is_bent in (False, True):
-        for size in given.sizes:
-            row = measured(size, is_bent)
-            line([told(row.get(name)) for name in COLUMNS], widths, separator, given.markdown)
+    given = table.arguments(__doc__.splitlines()[0], SIZES)
+    rows = (measured(size, is_bent) for is_bent in (False, True) for size in given.sizes)
+    table.show(COLUMNS, rows, given.markdown)
 
 
 def box(is_bent: bool) -> np.ndarray:
@@ -52,7 +42,7 @@ def box(is_bent: bool) -> np.ndarray:
     return np.stack([2 * z + chord * x, chord * 0.2 * (y - 0.5) + 0.3 * z**2, 8 * z], axis=-1)
 
 
-def measured(size: int, is_bent: bool) -> dict[str, float | str]:
+def measured(size: int, is_bent: bool) -> table.Row:
     """One row."""
     import jax
 

@@ -6,17 +6,17 @@ usage: python benchmarks/files.py [--markdown] [--sizes 1000000 10000000]
 `moldline deform --stream` with a lattice of 10 x 10 x 10, file to file, its start-up included.
 """
 
-import argparse
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from deform import line, surface_points, told
+import table
+from deform import surface_points
+from table import best
 
 import moldline as ml
 
@@ -52,22 +52,12 @@ axis = "z"
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES))
-    parser.add_argument("--markdown", action="store_true", help="a table for the docs")
-    given = parser.parse_args()
-    separator = " | " if given.markdown else "  "
-    widths = [max(len(name), 12) for name in COLUMNS]
-    line(COLUMNS, widths, separator, given.markdown)
-    if given.markdown:
-        line(["---:"] * len(COLUMNS), widths, separator, True)
-    for size in given.sizes:
-        for name, options in FILES.items():
-            row = measured(size, name, options)
-            line([told(row.get(column)) for column in COLUMNS], widths, separator, given.markdown)
+    given = table.arguments(__doc__.splitlines()[0], SIZES)
+    rows = (measured(size, *file) for size in given.sizes for file in FILES.items())
+    table.show(COLUMNS, rows, given.markdown)
 
 
-def measured(size: int, name: str, options: dict[str, Any]) -> dict[str, float | str]:
+def measured(size: int, name: str, options: dict[str, Any]) -> table.Row:
     """One row."""
     geometry = made(size, name)
     with tempfile.TemporaryDirectory() as folder:
@@ -76,7 +66,7 @@ def measured(size: int, name: str, options: dict[str, Any]) -> dict[str, float |
         del geometry
         cp = best(lambda: subprocess.run(["cp", path, copy], check=True))
         read = best(lambda: ml.read(path))
-        row: dict[str, float | str] = {
+        row: table.Row = {
             "points": size, "file": name, "MB": path.stat().st_size / 1e6, "cp [s]": cp,
             "read [s]": read, "x": read / cp, "write [s]": write, "x ": write / cp,
         }  # fmt: skip
@@ -106,16 +96,6 @@ def made(size: int, name: str) -> ml.Geometry:
     cells = Cells(np.full(len(faces), 5), np.arange(0, 3 * len(faces) + 1, 3), faces.ravel())
     tetra = Cells(np.array([10]), np.array([0, 4]), np.arange(4))
     return ml.VolumeMesh(points, tetra, {"1": cells})
-
-
-def best(call: Callable[[], object], repeats: int = 3) -> float:
-    """The shortest of a few times [s]: files are disturbed more than they vary."""
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 if __name__ == "__main__":

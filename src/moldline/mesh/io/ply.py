@@ -22,7 +22,7 @@ from ..._types import Array
 from ...errors import FileError, GeometryError
 from ..surface import Surface
 from . import text
-from .files import contents, replacing
+from .files import Bytes, loaded, replacing
 from .ply_tables import TYPES, Element, Property, Table, tables
 from .polygons import fans
 
@@ -64,11 +64,11 @@ def sniff(head: bytes, path: Path | str) -> bool:
 
 def read(path: Path | str) -> Surface:
     """The surface in a file, whichever variant it is."""
-    data = contents(path)
+    data = loaded(path)
     header = _header(data, path)
-    body, unit = memoryview(data)[header.size :], 1
+    body, unit = data[header.size :], 1
     if not header.order:
-        body, unit = _as_floats(data[header.size :], header.lines, path), 8
+        body, unit = _as_floats(bytes(body), header.lines, path), 8
     found = tables(body, header.elements, unit, path)
     if "vertex" not in found:
         raise FileError(f"{path}: the header has no 'element vertex', so there are no points")
@@ -105,13 +105,15 @@ def write(path: Path | str, surface: Surface, binary: bool = True) -> None:
                 file.write(part.tobytes() if binary else _as_text(part))
 
 
-def _header(data: bytes, path: Path | str) -> Header:
+def _header(data: Bytes, path: Path | str) -> Header:
     first, end = _FIRST.match(data), _END.search(data)
     if not first:
-        raise FileError(f"{path}: found {text.quoted(data[:20])}, expected 'ply' on the first line")
+        raise FileError(
+            f"{path}: found {text.quoted(bytes(data[:20]))}, expected 'ply' on the first line"
+        )
     if not end:
         raise FileError(f"{path}: the header has no 'end_header'; was the copy cut short?")
-    lines = text.unix(data[: end.start()]).split(b"\n")
+    lines = text.unix(bytes(data[: end.start()])).split(b"\n")
     encodings = [line.split() for line in lines if line.lstrip().startswith(b"format")]
     if len(encodings) != 1 or len(encodings[0]) != 3 or encodings[0][1] not in _ORDERS:
         raise FileError(

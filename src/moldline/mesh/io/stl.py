@@ -77,7 +77,7 @@ def write(path: Path | str, surface: Surface, binary: bool = False) -> None:
                 narrowed(corners, np.dtype("<f4"), path),
             )
             file.write(b"moldline".ljust(80) + len(corners).to_bytes(4, "little"))
-            file.write(records.tobytes())
+            file.write(records.view(np.uint8).data)
             return
         for number, name in enumerate(surface.components):
             own = surface.tags == number

@@ -36,6 +36,9 @@ HOLDS = Grid
 
 _COUNT = re.compile(rb"[1-9]\d{0,6}")
 
+BLOCKS = 2**17
+"""More in a binary file are a number read in the wrong byte order."""
+
 LONGEST = 2**23
 """Points along an axis are fewer than this; as a 4-byte float it would be next to 0."""
 
@@ -194,7 +197,7 @@ def _binary_headers(data: Bytes, layout: Layout) -> Iterator[Header]:
     """As `_headers`, for one layout of binary data."""
     ranks = (3, 2) if layout.records else (3,)
     count = layout.integers(data, 1, 1)
-    if count and 1 <= count[0] <= len(data) // 8:
+    if count and 1 <= count[0] <= min(len(data) // 8, BLOCKS):
         begin = 12 if layout.records else 4  # past the number of blocks, and its end marker
         for rank in ranks:
             length = rank * count[0]

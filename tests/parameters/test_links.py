@@ -7,6 +7,9 @@ import pytest
 
 import moldline as ml
 from moldline import links
+from moldline.deformers.contract import check
+from moldline.deformers.lattice import Lattice
+from moldline.deformers.posed import AbstractPosed
 from moldline.errors import ParameterError
 
 BOX = ml.Lattice.box((-1, -2, -0.5), (1, 2, 0.5), (4, 3, 2))
@@ -155,3 +158,63 @@ def test_a_variable_that_cannot_be_is_refused(arguments, message):
 def test_a_link_that_cannot_be_is_refused(make, message):
     with pytest.raises(ParameterError, match=message):
         make()
+
+
+class Posed(AbstractPosed):
+    """A box whose two parameters lift it and stretch it upwards."""
+
+    net: Lattice
+
+    @property
+    def size(self):
+        return 3
+
+    @property
+    def parameters(self):
+        return {"lift": np.array([2]), "spread": np.array([0, 1])}
+
+    @property
+    def values(self):
+        return np.array([2.0, 3.0, 5.0])
+
+    def pose(self, controls):
+        low, high, lift = controls
+        share = self.net.rest.reshape(-1, 3)[:, 2:] + 0.5
+        up = np.array([0.0, 0.0, 1.0])
+        return ((lift + share * high + (1 - share) * low) * up).reshape(-1)
+
+
+def test_a_named_parameter_is_turned_by_changes_or_by_what_it_measures():
+    posed = Posed(BOX)
+    change = links.named(posed, "spread")
+    np.testing.assert_array_equal(change(np.array([0.5, 0.25])), [0.5, 0.25, 0.0])
+    measured = links.named(posed, "spread", absolute=True)
+    np.testing.assert_array_equal(measured(np.array([2.5, 3.25])), [0.5, 0.25, 0.0])
+    one = links.named(posed, "spread", index=[1], absolute=True)
+    np.testing.assert_array_equal(one(np.array([3.25])), [0.0, 0.25, 0.0])
+    lift = links.named(posed, "lift", absolute=True)
+    both = (lift + one) * 2.0
+    np.testing.assert_array_equal(both(np.array([4.0])), [0.0, 2.0, -2.0])
+    np.testing.assert_array_equal((measured @ np.ones((2, 1)))(np.array([3.0])), [1.0, 0.0, 0.0])
+
+
+def test_an_unknown_parameter_is_refused_with_those_there_are():
+    with pytest.raises(ParameterError, match="no parameter 'twist'; there is: lift, spread"):
+        links.named(Posed(BOX), "twist")
+    with pytest.raises(ParameterError, match="numbers of 'spread' run from 0 to 1, got 2"):
+        links.named(Posed(BOX), "spread", index=[2])
+
+
+def test_a_posed_net_keeps_the_contract():
+    rng = np.random.default_rng(5)
+    check(Posed(BOX), rng.uniform(-0.4, 0.4, (40, 3)))
+
+
+def test_absolute_values_at_rest_move_nothing(ball):
+    points = np.asarray(ball.points) * 0.4
+    twist = ml.variable("spread", value=(2.0, 3.0))
+    stage = ml.Stage(Posed(BOX), {twist: links.named(Posed(BOX), "spread", absolute=True)})
+    pipeline = ml.Pipeline(ml.Cloud(points), [stage])
+    assert np.array_equal(pipeline.points(), points)
+    moved = pipeline.points({"spread": (2.0, 3.5)})
+    assert np.abs(np.asarray(moved) - points).max() > 0.2

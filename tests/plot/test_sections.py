@@ -5,7 +5,7 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from moldline.errors import ParameterError
-from moldline.plot import cut, draw_section, section_picture
+from moldline.plot import Net, cut, draw_section, section_picture
 from moldline.plot.figure import blank
 
 
@@ -55,9 +55,8 @@ def test_an_unknown_axis_is_refused(ball):
 def test_a_section_is_dashed_at_rest_and_solid_when_deformed():
     axes = blank().subplots()
     curve = np.array([[1, 0, 0], [0, 0.1, 0], [1, 0.1, 0]], float)
-    grid = np.zeros((3, 2, 1, 3))
     up = np.array([0, 0.2, 0])
-    draw_section(axes, curve, curve + up, [(grid, grid + up)])
+    draw_section(axes, curve, curve + up, [Net(np.array([[0, 1], [1, 2]]), curve, curve + up)])
     rest, moved = axes.lines
     assert rest.is_dashed() and not moved.is_dashed()
     np.testing.assert_allclose(moved.get_ydata(), curve[:, 1] + 0.2)

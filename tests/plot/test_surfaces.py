@@ -5,10 +5,11 @@ import pytest
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
+from moldline.deformers.net import grid_lines
 from moldline.errors import ParameterError
-from moldline.plot import before_and_after, draw_lattice, draw_surface, sensitivity_map
+from moldline.plot import before_and_after, draw_net, draw_surface, sensitivity_map
 from moldline.plot.figure import blank
-from moldline.plot.surfaces import RED
+from moldline.plot.nets import RED
 
 TRIANGLE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
 
@@ -20,15 +21,16 @@ def stacked(*heights):
 
 
 def drawn(kind, *arguments, **named):
-    """What `draw_surface` or `draw_lattice` adds to empty axes."""
+    """What `draw_surface` or `draw_net` adds to empty axes."""
     axes = blank().subplots()
-    (draw_surface if kind is PolyCollection else draw_lattice)(axes, *arguments, **named)
+    (draw_surface if kind is PolyCollection else draw_net)(axes, *arguments, **named)
     return [found for found in axes.collections if isinstance(found, kind)]
 
 
 def box(*shape):
-    """Control points of a unit box."""
-    return np.stack(np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij"), axis=-1)
+    """Lines and control points of a unit box."""
+    grid = np.meshgrid(*(np.linspace(0, 1, n) for n in shape), indexing="ij")
+    return grid_lines(np.arange(np.prod(shape)).reshape(shape)), np.stack(grid, -1).reshape(-1, 3)
 
 
 def test_near_triangles_are_drawn_last():
@@ -97,32 +99,32 @@ def test_values_of_a_wrong_length_are_refused(ball):
         draw_surface(blank().subplots(), ball.points, ball.faces, np.zeros(3))
 
 
-def test_a_lattice_has_a_line_for_every_row_along_each_axis():
-    (lines,) = drawn(LineCollection, box(4, 3, 2))
-    assert len(lines.get_segments()) == 3 * 2 + 4 * 2 + 4 * 3
-    (flat,) = drawn(LineCollection, box(4, 3, 1))
-    assert len(flat.get_segments()) == 3 + 4
+def test_a_lattice_has_a_line_between_neighbours_along_each_axis():
+    (lines,) = drawn(LineCollection, *box(4, 3, 2))
+    assert len(lines.get_segments()) == 3 * (3 * 2) + 2 * (4 * 2) + 1 * (4 * 3)
+    (flat,) = drawn(LineCollection, *box(4, 3, 1))
+    assert len(flat.get_segments()) == 3 * 3 + 2 * 4
 
 
 def test_moved_controls_are_red_over_the_dashed_lattice_at_rest():
-    rest = box(2, 2, 2)
+    lines, rest = box(2, 2, 2)
     moved = rest + np.array([0, 0, 1])
-    dashed, solid = drawn(LineCollection, rest, moved, view="side")
+    dashed, solid = drawn(LineCollection, lines, rest, moved, view="side")
     assert dashed.get_linestyle()[0][1] is not None
     assert solid.get_linestyle()[0][1] is None
-    (controls,) = drawn(PathCollection, rest, moved, view="side")
+    (controls,) = drawn(PathCollection, lines, rest, moved, view="side")
     assert controls.get_offsets()[:, 1].min() == pytest.approx(1.0)
     np.testing.assert_allclose(controls.get_facecolor()[:, :3], [to_rgb(RED)] * 8)
 
 
 def test_what_is_farther_from_the_eye_is_paler():
-    (controls,) = drawn(PathCollection, box(2, 2, 2), view="top")
+    (controls,) = drawn(PathCollection, *box(2, 2, 2), view="top")
     alpha = controls.get_facecolor()[:, 3].reshape(2, 2, 2)
     assert np.all(alpha[..., 1] > alpha[..., 0])
 
 
 def test_highlighted_controls_are_larger():
-    every, chosen = drawn(PathCollection, box(3, 2, 2), highlighted=[(1, 0, 1), (2, 1, 0)])
+    every, chosen = drawn(PathCollection, *box(3, 2, 2), highlighted=[5, 10])
     assert len(every.get_offsets()) == 12
     assert len(chosen.get_offsets()) == 2
     assert chosen.get_sizes()[0] > 4 * every.get_sizes()[0]

@@ -12,6 +12,7 @@ import tomli_w
 from .. import registry
 from .._types import Points
 from ..deformers.base import AbstractDeformer
+from ..deformers.net import AbstractControlNet
 from ..errors import CaseError, MoldlineError, ParameterError
 from ..mesh import Cloud, Geometry
 from ..mesh.io import METRES, found, mapped, read
@@ -193,12 +194,22 @@ def _link(file: str, where: str, table: schema.LinkTable, deformer: AbstractDefo
     function = LINKS[table.link]
     model = options.of_link(table.link, function)
     given = schema.checked(model, table.model_extra or {}, file, where)
-    if table.link != "controls" and not hasattr(deformer, "rest"):
+    serves = options.deformer_of_link(function)
+    if not isinstance(deformer, serves):
+        others = [k for k, f in LINKS.items() if isinstance(deformer, options.deformer_of_link(f))]
         raise CaseError(
-            f'{file}: {where}.link: {table.link!r} needs a lattice; use link = "controls"'
+            f"{file}: {where}.link: {table.link!r} is for a {serves.__name__}, the stage has a "
+            f"{type(deformer).__name__}; it takes {', '.join(others)}"
         )
     link = function(deformer, **given) * table.scale
-    return mirrored(deformer, link, table.mirrored) if table.mirrored else link  # type: ignore
+    if not table.mirrored:
+        return link
+    if not isinstance(deformer, AbstractControlNet):
+        raise CaseError(
+            f"{file}: {where}.mirrored: this is for control points, the stage has a "
+            f"{type(deformer).__name__}"
+        )
+    return mirrored(deformer, link, table.mirrored)
 
 
 def _without_none(table: Any) -> Any:

@@ -35,6 +35,12 @@ def of_deformer(name: str, cls: type[AbstractDeformer]) -> type[BaseModel]:
     return model_of(name, cls.options())
 
 
+def deformer_of_link(function: Callable[..., Any]) -> type[AbstractDeformer]:
+    """The deformers that a link is for."""
+    first, *_ = inspect.signature(function, eval_str=True).parameters.values()
+    return first.annotation
+
+
 def of_link(name: str, function: Callable[..., Any]) -> type[BaseModel]:
     """What a case file may say to make a link, for a deformer given already."""
     parameters = dict(inspect.signature(function).parameters)

@@ -70,6 +70,5 @@ def _window(given: argparse.Namespace) -> int:
         return 0
     case = load(given.case)
     chosen = values.chosen(case, given)
-    grids = [moved for _, moved in pictures.lattices(case.pipeline, chosen)]
-    window.show(case.pipeline(chosen), lattices=grids)
+    window.show(case.pipeline(chosen), nets=pictures.nets(case.pipeline, chosen))
     return 0

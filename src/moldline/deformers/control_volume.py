@@ -18,7 +18,7 @@ from ..mesh.io.su2_boxes import read_boxes
 from ..numerics.inversion import Places
 from .base import AbstractBinding, DefinedBinding
 from .embedding import EmbeddedBinding, Embedding, Part
-from .net import AXES, AbstractControlNet
+from .net import AXES, AbstractControlNet, grid_lines
 from .volume_frame import Box, Frame, as_array
 
 Outside = Literal["refuse", "keep"]
@@ -140,9 +140,10 @@ class ControlVolume(AbstractControlNet):
     def direction(self, axis: str) -> Float[np.ndarray, "3"]:
         return np.eye(3)[AXES[axis]]
 
+    @property
     @override
-    def grids(self, places: Points) -> list[Float[np.ndarray, "_ _ _ 3"]]:
-        return [np.asarray(places)[index] for index in self.frame.index]
+    def lines(self) -> Int[np.ndarray, "l 2"]:
+        return np.concatenate([grid_lines(index) for index in self.frame.index])
 
     @override
     def samples(self, most: int) -> Points:

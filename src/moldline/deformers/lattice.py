@@ -17,7 +17,7 @@ from ..numerics.tensor_spline import evaluated
 from .base import AbstractBinding, DefinedBinding
 from .embedding import EmbeddedBinding, Embedding, Part
 from .lattice_kernels import Following
-from .net import AXES, AbstractControlNet
+from .net import AXES, AbstractControlNet, grid_lines
 
 LONGEST, MOST = 512, 2**20
 """Control points along an axis, and in all; more are a slip of the pen."""
@@ -202,9 +202,10 @@ class Lattice(AbstractControlNet):
             raise ParameterError(f"indices (i, j, k) of a lattice of {self.shape}, got {index}")
         return np.ravel_multi_index(tuple(rows.T), self.shape)
 
+    @property
     @override
-    def grids(self, places: Points) -> list[Float[np.ndarray, "_ _ _ 3"]]:
-        return [np.asarray(places).reshape(*self.shape, 3)]
+    def lines(self) -> Int[np.ndarray, "l 2"]:
+        return grid_lines(np.arange(self.size // 3).reshape(self.shape))
 
     @override
     def samples(self, most: int) -> Points:

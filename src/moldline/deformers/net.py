@@ -40,9 +40,10 @@ class AbstractControlNet(AbstractDeformer):
     def direction(self, axis: str) -> Float[np.ndarray, "3"]:
         """Unit vector of one of the net's own axes."""
 
+    @property
     @abc.abstractmethod
-    def grids(self, places: Points) -> list[Float[np.ndarray, "_ _ _ 3"]]:
-        """Places of all control points (m, 3) as the grids that they form, for pictures."""
+    def lines(self) -> Int[np.ndarray, "l 2"]:
+        """Pairs of control points, by number, that pictures join."""
 
     @abc.abstractmethod
     def samples(self, most: int) -> Points:
@@ -55,3 +56,12 @@ class AbstractControlNet(AbstractDeformer):
     def moved(self, controls: Vector) -> Float[Array, "*counts 3"]:
         """Control points where the controls put them [m]."""
         return self.rest + self.moves(controls)
+
+
+def grid_lines(numbers: Int[np.ndarray, "nu nv nw"]) -> Int[np.ndarray, "l 2"]:
+    """Pairs of neighbours in a grid of control points, given their numbers."""
+    pairs = [
+        np.stack([np.delete(numbers, -1, axis), np.delete(numbers, 0, axis)], axis=-1)
+        for axis in range(3)
+    ]
+    return np.concatenate([pair.reshape(-1, 2) for pair in pairs])

@@ -1,4 +1,4 @@
-"""Links: linear maps from a variable's numbers to a deformer's controls."""
+"""Links: affine maps from a variable's numbers to a deformer's controls."""
 
 from typing import Literal
 
@@ -13,7 +13,7 @@ Across = Literal["x", "y", "z"]
 
 
 class Link(eqx.Module):
-    """Controls are the matrix times the variable.
+    """Controls are the matrix times the variable, less what the variable is at rest.
 
     Attributes
     ----------
@@ -22,14 +22,22 @@ class Link(eqx.Module):
     across
         The plane of symmetry that this link respects (the coordinate that is 0 on it), if any:
         a stage all of whose links respect it keeps points on that plane there, to the bit.
+    rest
+        The controls that the variable's numbers at rest would give; zero where it is left out.
     """
 
     matrix: Float[Array, "k v"]
     across: Across | None = eqx.field(static=True, default=None)
+    rest: Float[Array, "k"] | None = None
 
     def __check_init__(self) -> None:
         if not np.all(np.isfinite(np.asarray(self.matrix))):
             raise ParameterError("a link's matrix must be finite")
+
+    def __call__(self, numbers: Float[Array, "v"]) -> Float[Array, "k"]:
+        """Controls, counted from the neutral ones."""
+        turned = self.matrix @ numbers
+        return turned if self.rest is None else turned - self.rest
 
     @property
     def size(self) -> int:
@@ -43,14 +51,22 @@ class Link(eqx.Module):
                 f"links of shapes {self.matrix.shape} and {other.matrix.shape} do not add"
             )
         both = self.across if self.across == other.across else None
-        return Link(self.matrix + other.matrix, both)
+        return Link(self.matrix + other.matrix, both, _sum(self.rest, other.rest))
 
     def __mul__(self, factor: float) -> "Link":
         """The same motion, scaled."""
-        return Link(self.matrix * factor, self.across)
+        return Link(self.matrix * factor, self.across, _scaled(self.rest, factor))
 
     __rmul__ = __mul__
 
     def __matmul__(self, mix: Float[Array, "v w"]) -> "Link":
         """The same controls turned by other numbers: variable = mix @ other."""
-        return Link(self.matrix @ np.asarray(mix, float), self.across)
+        return Link(self.matrix @ np.asarray(mix, float), self.across, self.rest)
+
+
+def _sum(one: Array | None, other: Array | None) -> Array | None:
+    return other if one is None else one if other is None else one + other
+
+
+def _scaled(rest: Array | None, factor: float) -> Array | None:
+    return None if rest is None else rest * factor

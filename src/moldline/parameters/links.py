@@ -15,6 +15,7 @@ from .._types import Array
 from ..deformers.base import AbstractDeformer
 from ..deformers.lattice import Lattice
 from ..deformers.net import AXES, AbstractControlNet
+from ..deformers.posed import AbstractPosed
 from ..errors import ParameterError
 from .link import Across, Link
 
@@ -28,6 +29,28 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
     matrix = np.zeros((deformer.size, len(chosen)))
     matrix[list(chosen), range(len(chosen))] = 1.0
     return Link(matrix)
+
+
+def named(
+    posed: AbstractPosed,
+    parameter: str,
+    index: Sequence[int] | None = None,
+    absolute: bool = False,
+) -> Link:
+    """One variable number for each number of a skeleton's parameter, or for those given by index.
+
+    The numbers are changes; with `absolute` they are what the parameter measures itself, such as a
+    sweep of 35 degrees.
+    """
+    known = posed.parameters
+    if parameter not in known:
+        raise ParameterError(f"no parameter {parameter!r}; there is: {', '.join(known)}")
+    chosen = range(len(known[parameter])) if index is None else index
+    _check_numbers(chosen, len(known[parameter]), f"the numbers of {parameter!r}")
+    link = controls(posed, [int(known[parameter][i]) for i in chosen])
+    if not absolute:
+        return link
+    return Link(link.matrix, rest=link.matrix @ (link.matrix.T @ np.asarray(posed.values)))
 
 
 def each(net: AbstractControlNet, axis: AxisName, **where: Any) -> Link:
@@ -205,6 +228,7 @@ def _check_numbers(numbers: Sequence[int], count: int, what: str) -> None:
 
 LINKS: dict[str, Callable[..., Link]] = {
     "controls": controls,
+    "named": named,
     "each": each,
     "group": group,
     "groups": groups,

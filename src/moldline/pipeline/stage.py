@@ -81,7 +81,7 @@ class Stage(eqx.Module):
         """Controls from the variables' values, given in the designer's units."""
         total = jnp.asarray(self.deformer.neutral)
         for variable, link in self.links.items():
-            total = total + link.matrix @ (values[variable.name] * variable.factor)
+            total = total + link(values[variable.name] * variable.factor)
         return total
 
     def bind(self, geometry: str, points: Points) -> AbstractBinding:

@@ -2,16 +2,18 @@
 
 from .faults import of_faults
 from .figure import save
+from .nets import Net, draw_net
 from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
 from .sections import cut, draw_section, section_picture
-from .surfaces import before_and_after, draw_lattice, draw_surface, sensitivity_map
+from .surfaces import before_and_after, draw_surface, sensitivity_map
 from .view import View
 
 __all__ = [
+    "Net",
     "View",
     "before_and_after",
     "cut",
-    "draw_lattice",
+    "draw_net",
     "draw_section",
     "draw_surface",
     "of_cuts",

@@ -2,20 +2,22 @@
 
 import re
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from .._types import Vector
 from ..deformers.net import AbstractControlNet
+from ..deformers.posed import AbstractPosed
 from ..errors import ParameterError
 from ..mesh import Cloud, Geometry, Section, VolumeMesh
 from ..mesh.joined import joined_points
 from ..pipeline.pipeline import Pipeline, Values
 from ..pipeline.stage import Stage
 from .figure import blank
+from .nets import Net, draw_net
 from .sections import draw_section, section_picture
-from .surfaces import before_and_after, draw_edges, draw_lattice, draw_surface, sensitivity_map
+from .surfaces import before_and_after, draw_edges, draw_surface, sensitivity_map
 from .view import View
 
 
@@ -41,18 +43,18 @@ def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -
 def of_deformation(
     pipeline: Pipeline, values: Values | None = None, view: View | str = "iso", title: str = ""
 ) -> Figure:
-    """A pipeline's geometry before and after, with its lattices; of meshes and clouds the after."""
+    """A pipeline's geometry before and after, with its control points; of others the after."""
     rest, moved = pipeline.geometry.points, pipeline.points(values)
-    grids = lattices(pipeline, values)
+    drawn = nets(pipeline, values)
     if isinstance(pipeline.geometry, Section):
         figure = blank(12, 5)
         axes = figure.subplots()
-        draw_section(axes, rest, moved, grids)
+        draw_section(axes, rest, moved, drawn)
         axes.set_title(title)
         return figure
     if not hasattr(pipeline.geometry, "faces"):
-        return _among_points(pipeline(values), grids, view, title)
-    return before_and_after(rest, moved, _faces(pipeline), grids, view, title)
+        return _among_points(pipeline(values), drawn, view, title)
+    return before_and_after(rest, moved, _faces(pipeline), drawn, view, title)
 
 
 def of_sensitivity(
@@ -72,7 +74,6 @@ def of_sensitivity(
     direction = {name: np.eye(variable.size)[index]}
     motion = np.asarray(pipeline.pushforward(values, direction))
     axis = int(np.abs(motion).max(axis=0).argmax())
-    grids = lattices(pipeline, values)
     unit = f" per {variable.unit}" if variable.unit else ""
     label = f"d{'xyz'[axis]} / d {variable.labels()[index]}{unit and ' [m' + unit + ']'}"
     return sensitivity_map(
@@ -80,7 +81,7 @@ def of_sensitivity(
         _faces(pipeline),
         motion[:, axis],
         label,
-        [moved for _, moved in grids],
+        nets(pipeline, values),
         _highlighted(pipeline, direction),
         view,
         title,
@@ -101,15 +102,15 @@ def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
     return np.concatenate([joined_points(skin) for skin in skins])
 
 
-def lattices(pipeline: Pipeline, values: Values | None = None) -> list[tuple[Any, Any]]:
-    """Grids of control points of a pipeline, at rest and moved, shape (nu, nv, nw, 3)."""
+def nets(pipeline: Pipeline, values: Values | None = None) -> list[Net]:
+    """Control points of a pipeline's stages."""
     full = pipeline.values(values)
-    found: list[tuple[Any, Any]] = []
+    found = []
     for stage, net in _nets(pipeline):
         rest = net.rest.reshape(-1, 3)
         place = _carried(pipeline, stage, rest, full) if stage.carried else rest
-        moved = place + np.asarray(net.moves(stage.controls(full))).reshape(-1, 3)
-        found += zip(net.grids(rest), net.grids(moved), strict=True)
+        moves = net.moves(_net_controls(stage, stage.controls(full)))
+        found.append(Net(net.lines, rest, place + np.asarray(moves).reshape(-1, 3)))
     return found
 
 
@@ -124,35 +125,43 @@ def _carried(pipeline: Pipeline, last: Stage, rest: np.ndarray, values: Values) 
 
 
 def _nets(pipeline: Pipeline) -> list[tuple[Stage, AbstractControlNet]]:
-    stages = pipeline.own_stages
-    return [(s, s.deformer) for s in stages if isinstance(s.deformer, AbstractControlNet)]
-
-
-def _highlighted(
-    pipeline: Pipeline, direction: dict[str, np.ndarray]
-) -> list[tuple[int, np.ndarray]]:
-    """Of each grid the control points that a number moves."""
-    found: list[tuple[int, np.ndarray]] = []
-    for stage, net in _nets(pipeline):
-        moves = np.zeros(net.size)
-        for variable, link in stage.links.items():
-            if variable.name in direction:
-                moves = moves + np.asarray(link.matrix) @ direction[variable.name]
-        free = np.asarray(net.moves(moves)).reshape(-1, 3)
-        for grid in net.grids(free):
-            found.append((len(found), np.argwhere(np.any(grid != 0, axis=-1))))
+    found = []
+    for stage in pipeline.own_stages:
+        if isinstance(stage.deformer, AbstractControlNet):
+            found.append((stage, stage.deformer))
+        elif isinstance(stage.deformer, AbstractPosed):
+            found.append((stage, stage.deformer.net))
     return found
 
 
-def _among_points(geometry: Geometry, grids: list[Any], view: View | str, title: str) -> Figure:
-    """A mesh or a cloud with lattices in it, of which it may reach far beyond."""
+def _net_controls(stage: Stage, controls: Vector) -> Vector:
+    if isinstance(stage.deformer, AbstractPosed):
+        return stage.deformer.pose(controls)
+    return controls
+
+
+def _highlighted(pipeline: Pipeline, direction: dict[str, np.ndarray]) -> list[np.ndarray]:
+    """Of each net the control points that a number moves."""
+    found = []
+    for stage, net in _nets(pipeline):
+        controls = np.zeros(stage.deformer.size)
+        for variable, link in stage.links.items():
+            if variable.name in direction:
+                controls = controls + np.asarray(link.matrix) @ direction[variable.name]
+        moves = np.asarray(net.moves(_net_controls(stage, controls))).reshape(-1, 3)
+        found.append(np.flatnonzero(np.any(moves != 0, axis=1)))
+    return found
+
+
+def _among_points(geometry: Geometry, drawn: list[Net], view: View | str, title: str) -> Figure:
+    """A mesh or a cloud with control points in it, of which it may reach far beyond."""
     figure = of_geometry(geometry, view, title)
     (axes,) = figure.axes
     shown = View.of("top" if getattr(geometry, "dimension", 3) == 2 else view)
-    for grid in grids:
-        draw_lattice(axes, grid[0], grid[1], view=shown)
-    if grids:
-        corners = np.concatenate([np.reshape(grid, (-1, 3)) for pair in grids for grid in pair])
+    for net in drawn:
+        draw_net(axes, *net, view=shown)
+    if drawn:
+        corners = np.concatenate([places for net in drawn for places in (net.rest, net.moved)])
         low, high = (f(shown.project(corners)[:, :2], axis=0) for f in (np.min, np.max))
         room = 0.15 * (high - low).max()
         axes.set_aspect("equal", adjustable="box")

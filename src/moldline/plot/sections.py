@@ -11,9 +11,7 @@ from matplotlib.lines import Line2D
 
 from ..errors import ParameterError
 from .figure import blank
-from .surfaces import DARK, GREY, RED, grid_lines
-
-DASHES = (0, (5, 3))
+from .nets import DARK, DASHES, GREY, RED, Net
 
 
 def cut(points: Any, faces: Any, axis: str, at: float) -> list[np.ndarray]:
@@ -38,10 +36,10 @@ def draw_section(
     axes: Axes,
     points: Any,
     moved: Any = None,
-    lattices: Sequence[tuple[Any, Any]] = (),
+    nets: Sequence[Net] = (),
     plane: str = "xy",
 ) -> None:
-    """Draw a curve: at rest dashed, deformed solid, the lattices' moved control points red."""
+    """Draw a curve: at rest dashed, deformed solid, moved control points red."""
     i, j = (_number(name) for name in plane)
     points = np.asarray(points)
     if moved is None:
@@ -50,13 +48,13 @@ def draw_section(
         moved = np.asarray(moved)
         axes.plot(points[:, i], points[:, j], ls=DASHES, color=GREY, lw=1.2, label="initial")
         axes.plot(moved[:, i], moved[:, j], color=DARK, lw=1.6, label="deformed")
-    for lattice in lattices:
-        rest, new = (np.asarray(grid)[..., [i, j]] for grid in lattice)
+    for net in nets:
+        rest, new = (np.asarray(places)[:, [i, j]] for places in (net.rest, net.moved))
         axes.add_collection(
-            LineCollection(grid_lines(rest), colors=GREY, linewidths=0.5, linestyles=DASHES)
+            LineCollection(rest[net.lines], colors=GREY, linewidths=0.5, linestyles=DASHES)
         )
-        axes.add_collection(LineCollection(grid_lines(new), colors=RED, linewidths=0.7))
-        axes.scatter(new[..., 0], new[..., 1], s=20, color=RED, zorder=3)
+        axes.add_collection(LineCollection(new[net.lines], colors=RED, linewidths=0.7))
+        axes.scatter(new[:, 0], new[:, 1], s=20, color=RED, zorder=3)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(plane[0])

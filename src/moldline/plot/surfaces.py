@@ -1,4 +1,4 @@
-"""Triangulated surfaces, with the lattices around them and colours on them."""
+"""Triangulated surfaces, with the control points around them and colours on them."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,23 +7,18 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import CenteredNorm, Normalize, to_rgb, to_rgba_array
+from matplotlib.colors import CenteredNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 
 from ..errors import ParameterError
 from ..mesh import topology
 from .figure import blank
+from .nets import Net, draw_net
 from .view import View
 
 METAL = "#b4c2d2"
-RED = "#d62728"
-GREY = "#7a7a7a"
-DARK = "#22282f"
 LIGHT = np.array([-0.48, 0.62, 0.62])
 """Direction of the light in the picture: right, up, towards the eye."""
-
-LatticePoints = Any
-"""Control points, shape (nu, nv, nw, 3)."""
 
 
 def draw_surface(
@@ -67,36 +62,6 @@ def draw_surface(
     return scale
 
 
-def draw_lattice(
-    axes: Axes,
-    rest: LatticePoints,
-    moved: LatticePoints | None = None,
-    highlighted: Any = (),
-    view: View | str = "iso",
-) -> None:
-    """Draw a lattice: at rest thin, grey and dashed, moved dark with red control points.
-
-    `highlighted` are indices (i, j, k) of control points drawn larger. What is farther from the
-    eye is paler.
-    """
-    shown, rest = View.of(view), np.asarray(rest, float)
-    flat = shown.project(rest.reshape(-1, 3)).reshape(rest.shape)
-    if moved is None:
-        _draw_lines(axes, flat, DARK, 0.5, "-")
-    else:
-        _draw_lines(axes, flat, GREY, 0.5, (0, (4, 3)))
-        flat = shown.project(np.asarray(moved, float).reshape(-1, 3)).reshape(rest.shape)
-        _draw_lines(axes, flat, DARK, 0.8, "-")
-    right, up, depth = flat.reshape(-1, 3).T
-    axes.scatter(right, up, s=13, color=_faded(RED, depth), zorder=4, linewidths=0)
-    if len(highlighted):
-        chosen = np.ravel_multi_index(tuple(np.transpose(highlighted)), rest.shape[:3])
-        axes.scatter(
-            right[chosen], up[chosen], s=80, color="#ffd43b", edgecolors=DARK, lw=0.9, zorder=5
-        )
-    _tidy(axes)
-
-
 def draw_edges(axes: Axes, points: Any, edges: Any, view: View | str = "iso") -> None:
     """Draw the edges of a mesh."""
     projected = View.of(view).project(points)[:, :2]
@@ -110,20 +75,20 @@ def before_and_after(
     points: Any,
     moved: Any,
     faces: Any,
-    lattices: Sequence[tuple[LatticePoints, LatticePoints]] = (),
+    nets: Sequence[Net] = (),
     view: View | str = "iso",
     title: str = "",
 ) -> Figure:
-    """A picture of a surface at rest with its lattices, and deformed with them moved."""
-    shapes = [points, moved, *(grid for lattice in lattices for grid in lattice)]
+    """A picture of a surface at rest with its control points, and deformed with them moved."""
+    shapes = [points, moved, *(places for net in nets for places in (net.rest, net.moved))]
     low, high = frame(shapes, view)
     figure = fitted(14.0, 7.0, low, high)
     left, right = figure.subplots(1, 2)
     draw_surface(left, points, faces, view=view)
     draw_surface(right, moved, faces, view=view)
-    for rest, new in lattices:
-        draw_lattice(left, rest, view=view)
-        draw_lattice(right, rest, new, view=view)
+    for net in nets:
+        draw_net(left, net.lines, net.rest, view=view)
+        draw_net(right, *net, view=view)
     for axes, name in ((left, "before"), (right, "after")):
         axes.update_datalim([low, high])  # both at one scale and place
         axes.autoscale_view()
@@ -137,55 +102,22 @@ def sensitivity_map(
     faces: Any,
     values: Any,
     label: str,
-    lattices: Sequence[LatticePoints] = (),
-    highlighted: Sequence[tuple[int, Any]] = (),
+    nets: Sequence[Net] = (),
+    highlighted: Sequence[Any] = (),
     view: View | str = "iso",
     title: str = "",
 ) -> Figure:
-    """A picture of a surface coloured by a derivative, with its lattices.
+    """A picture of a surface coloured by a derivative, with its moved control points.
 
-    `highlighted` pairs the number of a lattice with the control points in it that the colours
-    belong to.
+    `highlighted` are, for each net, the numbers of the control points that the colours belong to.
     """
-    figure = fitted(11.0, 9.8, *frame([points, *lattices], view))
+    figure = fitted(11.0, 9.8, *frame([points, *(net.moved for net in nets)], view))
     axes = figure.subplots()
     draw_surface(axes, points, faces, values, view, label)
-    for number, rest in enumerate(lattices):
-        draw_lattice(axes, rest, highlighted=dict(highlighted).get(number, ()), view=view)
+    for net, chosen in zip(nets, highlighted or [()] * len(nets), strict=True):
+        draw_net(axes, net.lines, net.moved, highlighted=chosen, view=view)
     axes.set_title(title, fontsize=15)
     return figure
-
-
-def grid_lines(grid: np.ndarray) -> list[np.ndarray]:
-    """The polylines of a grid of control points along its three axes."""
-    lines = []
-    for axis in range(3):
-        if grid.shape[axis] > 1:
-            lines += list(np.moveaxis(grid, axis, 2).reshape(-1, grid.shape[axis], grid.shape[3]))
-    return lines
-
-
-def _draw_lines(axes: Axes, flat: np.ndarray, colour: str, width: float, style: Any) -> None:
-    """Draw a projected grid of control points."""
-    lines = grid_lines(flat)
-    colours = _faded(colour, np.array([line[:, 2].mean() for line in lines]))
-    drawn = LineCollection(
-        [line[:, :2] for line in lines],
-        colors=colours,
-        linewidths=width,
-        linestyles=style,
-        zorder=3,
-    )
-    axes.add_collection(drawn, autolim=False)
-    axes.update_datalim(flat[..., :2].reshape(-1, 2))
-
-
-def _faded(colour: str, depth: np.ndarray) -> np.ndarray:
-    """A colour for each depth, paler for the farther ones."""
-    nearness = (depth - depth.min()) / (np.ptp(depth) or 1.0)
-    faded = np.repeat(to_rgba_array(colour), len(depth), axis=0)
-    faded[:, 3] = 0.45 + 0.55 * nearness
-    return faded
 
 
 def _base_colours(

@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import MoldlineError
 from ..mesh import Geometry
 from ..mesh.joined import joined_points
-from .surfaces import GREY, METAL, RED, grid_lines
+from .nets import GREY, RED, Net
+from .surfaces import METAL
 
 TRIAL = (
     "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(64, 64));"
@@ -19,13 +20,10 @@ TRIAL = (
 )
 
 
-def show(
-    geometry: Geometry, values: Any = None, label: str = "", lattices: Sequence[Any] = ()
-) -> None:
+def show(geometry: Geometry, values: Any = None, label: str = "", nets: Sequence[Net] = ()) -> None:
     """Show a geometry until the window is closed.
 
-    `values`, per point or per face, colour it; `lattices` are arrays of control points (nu, nv,
-    nw, 3).
+    `values`, per point or per face, colour it; `nets` are drawn where they are moved to.
     """
     _check()
     import pyvista
@@ -45,12 +43,10 @@ def show(
         colours = {"scalars": np.asarray(values), "cmap": "RdBu_r", "scalar_bar_args": bar}
         colours["clim"] = (-largest, largest)
     plotter.add_mesh(shape, show_edges=len(points) < 2_000, **colours)
-    for grid in map(np.asarray, lattices):
-        for line in grid_lines(grid):
-            plotter.add_mesh(pyvista.lines_from_points(line), color=GREY)
-        plotter.add_points(
-            grid.reshape(-1, 3), color=RED, point_size=9, render_points_as_spheres=True
-        )
+    for net in nets:
+        joined = np.insert(np.asarray(net.lines), 0, 2, axis=1).ravel()
+        plotter.add_mesh(pyvista.PolyData(np.asarray(net.moved), lines=joined), color=GREY)
+        plotter.add_points(net.moved, color=RED, point_size=9, render_points_as_spheres=True)
     plotter.add_axes()
     plotter.show()
 

@@ -229,3 +229,22 @@ def test_a_surface_of_130_thousand_faces_is_searched_in_two_seconds(ball):
     began = time.perf_counter()
     assert pairs(tube, faces) == []
     assert time.perf_counter() - began < 2.0
+
+
+def test_faces_that_were_meant_to_lie_in_one_plane_do_not_cross():
+    along, across = np.meshgrid(np.linspace(0, 1, 41), np.linspace(0, 1, 31), indexing="ij")
+    flat = np.stack([(1 + 2 * across) * along, across, 0 * along], axis=-1).reshape(-1, 3)
+    number = np.arange(41 * 31).reshape(41, 31)
+    a, b, c, d = (number[i, j].ravel() for i, j in CORNERS)
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    for seed in range(5):
+        turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+        assert len(self_intersections(flat @ turn + 0.3, faces).pairs) == 0
+
+
+CORNERS = [
+    (slice(None, -1), slice(None, -1)),
+    (slice(1, None), slice(None, -1)),
+    (slice(1, None), slice(1, None)),
+    (slice(None, -1), slice(1, None)),
+]

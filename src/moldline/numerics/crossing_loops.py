@@ -1,7 +1,9 @@
 """Compiled loops that find the triangles of a soup that cross each other.
 
-Every decision is the sign of a determinant. Where rounding could change the sign it counts as 0,
-which means touching; coordinates must be of order 1, so that no product over- or underflows.
+Every decision is the sign of a determinant. Where rounding could change the sign, of the products
+or of the coordinates before, it counts as 0, which means touching; so faces that were meant to lie
+in one plane do not cross. Coordinates must be of order 1: no product over- or underflows, and
+their own rounding is known.
 
 Sources: the tests of two triangles follow Guigue and Devillers, J. Graphics Tools 8 (1), 2003, the
 error bounds are those of Shewchuk, Discrete & Computational Geometry 18, 1997.
@@ -15,6 +17,9 @@ LEAF = 4
 
 _BOUND_3D = (7.0 + 56.0 * 2.0**-53) * 2.0**-53
 _BOUND_2D = (3.0 + 16.0 * 2.0**-53) * 2.0**-53
+
+_ROUNDED = 2.0**-53
+"""What a coordinate of order 1 is off by."""
 
 _compiled = numba.njit(nogil=True, cache=True, error_model="numpy")
 
@@ -156,15 +161,18 @@ def _above(x: np.ndarray, a: int, b: int, c: int, d: int) -> int:
         + (abs(ca) + abs(ac)) * abs(bz)
         + (abs(ab) + abs(ba)) * abs(cz)
     )
-    return int(below < -_BOUND_3D * size) - int(below > _BOUND_3D * size)
+    reach = max(abs(ax), abs(ay), abs(az), abs(bx), abs(by), abs(bz), abs(cx), abs(cy), abs(cz))
+    bound = _BOUND_3D * size + 36 * _ROUNDED * reach * reach  # 18 differences, each of two
+    return int(below < -bound) - int(below > bound)
 
 
 @_compiled
 def _left(x: np.ndarray, u: int, v: int, a: int, b: int, c: int) -> int:
     """In the plane of two coordinates, on which side of the line from a to b c lies."""
-    one = (x[a, u] - x[c, u]) * (x[b, v] - x[c, v])
-    other = (x[a, v] - x[c, v]) * (x[b, u] - x[c, u])
-    bound = _BOUND_2D * (abs(one) + abs(other))
+    au, av, bu, bv = x[a, u] - x[c, u], x[a, v] - x[c, v], x[b, u] - x[c, u], x[b, v] - x[c, v]
+    one, other = au * bv, av * bu
+    reach = abs(au) + abs(av) + abs(bu) + abs(bv)
+    bound = _BOUND_2D * (abs(one) + abs(other)) + 2 * _ROUNDED * reach
     return int(one - other > bound) - int(one - other < -bound)
 
 

@@ -4,6 +4,7 @@ from .faults import of_faults
 from .figure import save
 from .nets import Net, draw_net
 from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
+from .reflections import of_reflections
 from .sections import cut, draw_section, section_picture
 from .surfaces import before_and_after, draw_surface, sensitivity_map
 from .view import View
@@ -20,6 +21,7 @@ __all__ = [
     "of_deformation",
     "of_faults",
     "of_geometry",
+    "of_reflections",
     "of_sensitivity",
     "save",
     "section_picture",

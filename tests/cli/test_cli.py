@@ -1,6 +1,7 @@
 """The commands as a user runs them."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -159,3 +160,12 @@ def test_a_mistake_is_told_on_one_line_with_status_1(
     told = capsys.readouterr().err
     assert message in told and "Traceback" not in told
     assert not list(tmp_path.iterdir())
+
+
+def test_jobs_sets_how_many_threads_may_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("MOLDLINE_THREADS", "7")
+    assert main(["deform", CASE, "--jobs", "1", "-o", str(tmp_path / "wing.tri")]) == 0
+    assert os.environ["MOLDLINE_THREADS"] == "1"
+    with pytest.raises(SystemExit):
+        main(["deform", CASE, "--jobs", "0", "-o", str(tmp_path / "wing.tri")])
+    assert "expected a count of at least 1, got '0'" in capsys.readouterr().err

@@ -1,5 +1,7 @@
 """Reflection lines."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
@@ -42,7 +44,7 @@ def test_a_crease_breaks_the_lines():
 
 
 def test_the_command_draws_them_and_refuses_what_has_no_surface(tmp_path, capsys):
-    wing = "examples/data/transport_wing.tri"
+    wing = str(Path(__file__).parents[2] / "examples/data/transport_wing.tri")
     assert main(["plot", wing, "--reflections", "-o", str(tmp_path / "r.png")]) == 0
     assert (tmp_path / "r.png").stat().st_size > 20_000
     (tmp_path / "c.dat").write_text("foil\n1 0\n0.5 0.1\n0 0\n0.5 -0.1\n1 0\n")

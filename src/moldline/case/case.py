@@ -170,7 +170,8 @@ def _stage(
         cls = registry.deformer(table.deformer)
         model = options.of_deformer(table.deformer, cls)
         given = schema.checked(model, table.model_extra or {}, file, where)
-        places = {k: Path(file).parent / v for k, v in given.items() if isinstance(v, Path)}
+        paths = {k: o.default for k, o in cls.options().items() if o.annotation is Path} | given
+        places = {k: Path(file).parent / v for k, v in paths.items() if isinstance(v, Path)}
         deformer = cls.build(geometries[on], **given | places)
         links: dict[Variable, Link] = {}
         for i, row in enumerate(table.link):

@@ -24,6 +24,15 @@ def configure(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--values", type=Path, metavar="FILE", help="JSON file of values: {name: number or list}"
     )
+    command.add_argument(
+        "--jobs", type=_count, metavar="N", help="processor cores to use; all without it"
+    )
+
+
+def _count(text: str) -> int:
+    if not text.isdecimal() or not int(text):
+        raise argparse.ArgumentTypeError(f"expected a count of at least 1, got {text!r}")
+    return int(text)
 
 
 def chosen(case: "Case", given: argparse.Namespace) -> dict[str, Any]:

@@ -1,5 +1,7 @@
 """Every deformer keeps the contract."""
 
+from pathlib import Path
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -49,6 +51,15 @@ VOLUMES = {
     "frozen": ml.ControlVolume([bent((8, 4, 4))], outside="keep", freeze=("i+",)),
 }
 
+
+APART = {
+    "skeleton": "test_skeleton.py",
+    "direct_skeleton": "test_skeleton.py",
+    "hinge": "test_hinge.py",
+    "wing_skeleton": "test_wing_skeleton.py",
+    "body_skeleton": "test_body_skeleton.py",
+}
+"""Those that need points of their own to be tried, and the files where they are."""
 
 EXAMPLES = {"lattice": LATTICES, "control_volume": VOLUMES}
 """Variants of each deformer of ours, by the name it is registered under."""
@@ -124,7 +135,10 @@ def test_a_plug_in_keeps_the_contract(name, cloud):
 def test_every_deformer_of_ours_is_tried():
     classes = {name: registry.deformer(name) for name in registry.deformers()}
     ours = {name for name, one in classes.items() if one.__module__.startswith("moldline.")}
-    assert ours == set(EXAMPLES)
+    assert ours == set(EXAMPLES) | set(APART)
+    for name, where in APART.items():
+        text = (Path(__file__).parent / where).read_text()
+        assert f"check({classes[name].__name__}" in text or "check(skeleton, " in text
     for name, variants in EXAMPLES.items():
         assert {type(deformer) for deformer in variants.values()} == {classes[name]}
 

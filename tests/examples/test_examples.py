@@ -10,7 +10,10 @@ import moldline as ml
 from moldline.mesh.health import health
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
-EXPECTED = {"ex01_transport_wing": {"motion": 99.37893082820044, "gradient": 4389.475353791933}}
+EXPECTED = {
+    "ex01_transport_wing": {"motion": 99.37893082820044, "gradient": 4389.475353791933},
+    "ex02_slender_fuselage": {"slenderness": 20.883722662938638, "gradient": 22755.626145026796},
+}
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("ex*.py")), ids=lambda p: p.stem)

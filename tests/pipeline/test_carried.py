@@ -8,7 +8,7 @@ import moldline as ml
 from moldline import links
 from moldline.deformers.contract import prove
 from moldline.pipeline import examine
-from moldline.plot.pictures import lattices
+from moldline.plot.pictures import nets
 
 
 @pytest.fixture(scope="module")
@@ -60,14 +60,12 @@ def test_points_that_ride_are_carried_too(family):
 
 
 def test_a_picture_shows_the_child_where_its_parent_takes_it(family):
-    _, (rest, moved) = lattices(family, VALUES)
+    _, (_, rest, moved) = nets(family, VALUES)
     still = {**VALUES, "nose": np.zeros(3)}
     parent = family.stages[0]
     expected = parent.deformer.follow(rest.reshape(-1, 3), parent.controls(family.values(still)))
-    np.testing.assert_allclose(
-        lattices(family, still)[1][1].reshape(-1, 3), expected, rtol=0, atol=1e-13
-    )
-    assert np.abs(moved - lattices(family, still)[1][1]).max() > 0.1
+    np.testing.assert_allclose(nets(family, still)[1].moved, expected, rtol=0, atol=1e-13)
+    assert np.abs(moved - nets(family, still)[1].moved).max() > 0.1
 
 
 def test_folds_of_a_carried_stage_are_found_by_its_own_slopes(family):

@@ -1,55 +1,19 @@
-"""Cuts of surfaces, and drawn sections."""
+"""Drawn sections."""
 
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
 
 from moldline.errors import ParameterError
-from moldline.plot import Net, cut, draw_section, section_picture
+from moldline.plot import Net, draw_section, section_picture
 from moldline.plot.figure import blank
 
 
-def test_a_cut_through_a_ball_is_one_closed_circle(ball):
-    (circle,) = cut(ball.points, ball.faces, "z", 0.1)
-    np.testing.assert_array_equal(circle[0], circle[-1])
-    radius = np.linalg.norm(circle[:, :2], axis=1)
-    np.testing.assert_allclose(radius, np.sqrt(1 - 0.01), atol=0.02)  # the ball is a polyhedron
-    np.testing.assert_allclose(circle[:, 2], 0.1, atol=1e-12)
-    lengths = np.linalg.norm(np.diff(circle, axis=0), axis=1)
-    np.testing.assert_allclose(lengths.sum(), 2 * np.pi * np.sqrt(1 - 0.01), rtol=0.02)
-
-
-def test_a_cut_through_points_in_the_plane_closes_too(ball):
-    assert np.any(ball.points[:, 2] == 0.0)
-    (circle,) = cut(ball.points, ball.faces, "z", 0.0)
-    np.testing.assert_array_equal(circle[0], circle[-1])
-
-
-def test_a_cut_through_two_bodies_gives_both(ball):
-    points = np.concatenate([ball.points, ball.points + np.array([3.0, 0, 0])])
-    faces = np.concatenate([ball.faces, ball.faces + len(ball.points)])
-    one, other = cut(points, faces, "y", 0.05)
-    assert {round(one[:, 0].mean()), round(other[:, 0].mean())} == {0, 3}
-
-
-def test_a_cut_through_an_open_surface_runs_from_border_to_border():
-    points = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0]], float)
-    faces = np.array([[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]])
-    (line,) = cut(points, faces, "y", 0.25)
-    assert len(line) == 5
-    assert sorted([line[0, 0], line[-1, 0]]) == [0.0, 2.0]
-    assert np.all(np.diff(line[:, 0]) > 0) or np.all(np.diff(line[:, 0]) < 0)
-
-
-def test_a_plane_that_misses_the_surface_cuts_nothing(ball):
-    assert cut(ball.points, ball.faces, "x", 2.0) == []
+def test_a_section_that_is_not_there_is_told(ball):
     with pytest.raises(ParameterError, match="no section at x = 2; the surface reaches from -1 to"):
         section_picture(ball.points, ball.points, ball.faces, [2.0], axis="x")
-
-
-def test_an_unknown_axis_is_refused(ball):
     with pytest.raises(ParameterError, match="an axis is x, y or z, got 'w'"):
-        cut(ball.points, ball.faces, "w", 0.0)
+        section_picture(ball.points, ball.points, ball.faces, [0.0], axis="w")
 
 
 def test_a_section_is_dashed_at_rest_and_solid_when_deformed():

@@ -88,9 +88,8 @@ class Case:
             for table in (*tables["geometry"].values(), *tables.get("rider", {}).values()):
                 table["file"] = str((self.path.parent / table["file"]).resolve())
             for table in tables.get("stage", []):
-                for key, option in registry.deformer(table["deformer"]).options().items():
-                    if option.annotation is Path and key in table:
-                        table[key] = str((self.path.parent / table[key]).resolve())
+                for key in options.paths(registry.deformer(table["deformer"])).keys() & table:
+                    table[key] = str((self.path.parent / table[key]).resolve())
         with replacing(target) as stream:
             stream.write(tomli_w.dumps(_without_none(tables)).encode())
 
@@ -170,7 +169,7 @@ def _stage(
         cls = registry.deformer(table.deformer)
         model = options.of_deformer(table.deformer, cls)
         given = schema.checked(model, table.model_extra or {}, file, where)
-        paths = {k: o.default for k, o in cls.options().items() if o.annotation is Path} | given
+        paths = options.paths(cls) | given
         places = {k: Path(file).parent / v for k, v in paths.items() if isinstance(v, Path)}
         deformer = cls.build(geometries[on], **given | places)
         links: dict[Variable, Link] = {}

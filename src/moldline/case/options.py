@@ -4,6 +4,7 @@ import inspect
 import reprlib
 import typing
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
@@ -33,6 +34,12 @@ def model_of(name: str, parameters: Mapping[str, inspect.Parameter]) -> type[Bas
 def of_deformer(name: str, cls: type[AbstractDeformer]) -> type[BaseModel]:
     """What a case file may say to build a deformer."""
     return model_of(name, cls.options())
+
+
+def paths(cls: type[AbstractDeformer]) -> dict[str, Any]:
+    """Options that are paths, and what they are where a case file does not say."""
+    found = {k: o for k, o in cls.options().items() if o.annotation in (Path, Path | None)}
+    return {k: o.default for k, o in found.items()}
 
 
 def deformer_of_link(function: Callable[..., Any]) -> type[AbstractDeformer]:

@@ -4,11 +4,12 @@ import argparse
 import importlib
 import io
 import json
+import os
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-COMMANDS = ("deform", "sensitivity", "check", "info", "convert", "plot", "schema")
+COMMANDS = ("parameterise", "deform", "sensitivity", "check", "info", "convert", "plot", "schema")
 
 DESCRIPTION = """\
 Deform discrete geometry for aerodynamic shape design, with exact sensitivities.
@@ -59,6 +60,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # some systems' output takes few letters
             stream.reconfigure(errors="backslashreplace")
+    if getattr(given, "jobs", None):
+        os.environ["MOLDLINE_THREADS"] = str(given.jobs)
     try:
         return int(given.run(given) or 0)
     except MoldlineError as error:

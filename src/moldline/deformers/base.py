@@ -8,6 +8,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Array, Points, Vector
@@ -51,9 +52,11 @@ class AbstractDeformer(eqx.Module):
         """The same for points that an earlier stage moves, by the fastest way there is."""
         return _defined(self, points, controls)
 
-    def settle(self, points: Points, controls: Vector) -> Vector:
-        """Controls to use, once the present surface is known; only pilots change them."""
-        return controls
+    def settle(
+        self, points: Points, controls: Vector
+    ) -> tuple["AbstractDeformer", Float[Array, "m"]]:
+        """What moves points, once the present shape is known; only pilots need to know it."""
+        return self, controls
 
     @classmethod
     def build(cls, geometry: Any, **options: Any) -> "AbstractDeformer":

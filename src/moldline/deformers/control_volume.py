@@ -12,19 +12,25 @@ from typing_extensions import override
 
 from .._types import Array, Points, Vector, is_concrete
 from ..errors import GeometryError, ParameterError
-from ..mesh import Grid
+from ..mesh import Grid, Surface
 from ..mesh.io import METRES, found, read, su2
 from ..mesh.io.su2_boxes import read_boxes
+from ..mesh.planform import planform
 from ..numerics.inversion import Places
 from .base import AbstractBinding, DefinedBinding
 from .embedding import EmbeddedBinding, Embedding, Part
+from .generators import along_wing
 from .net import AXES, AbstractControlNet, grid_lines
+from .refinement import Finer, Transfer, counted, cut, elevated, kept
 from .volume_frame import Box, Frame, as_array
 
 Outside = Literal["refuse", "keep"]
 
 NAMED = 3
 """Points outside that an error names."""
+
+PLANFORM = 33
+"""Stations at least where the sections of a wing are taken for its box."""
 
 HALVINGS = 40
 """Of a mesh edge, to find where it leaves the volumes."""
@@ -92,22 +98,81 @@ class ControlVolume(AbstractControlNet):
         return cls([known[name] for name in names or known], **options)
 
     @classmethod
+    def along_wing(
+        cls,
+        surface: Any,
+        shape: Sequence[int],
+        *,
+        component: str | None = None,
+        stations: Sequence[float] | None = None,
+        margin: float | Sequence[float] = 0.05,
+        degree: int | Sequence[int] = 3,
+        **options: Any,
+    ) -> "ControlVolume":
+        """One box along a wing, half or whole, or along the component that is one: it encloses it.
+
+        `shape` counts control points along the chord (i), the span (j) and upwards (k); x is
+        streamwise, y along the span, z up. Its sections are as wide and high as the wing's there,
+        and swept, tapered and twisted as they are; `margin` is what they are larger by at each
+        side, and the box beyond the tip, as a fraction. `stations` are the places along y of the
+        spanwise rows [m], such as one at a kink. A half wing's box ends on its plane y = 0.
+        """
+        if not isinstance(surface, Surface):
+            raise GeometryError(f"a wing's box needs a surface, got a {type(surface).__name__}")
+        counts, degrees = counted(shape), (degree,) * 3 if isinstance(degree, int) else degree
+        if min(counts) < 2:
+            raise ParameterError(f"a wing's box needs 2 control points each way, got {counts}")
+        points = np.asarray(surface.points)
+        if component is not None:
+            points = points[surface.component(component)]
+        plan = planform(surface, max(PLANFORM, counts[1]), component)
+        box = along_wing(points, plan, counts, margin, degrees, stations)
+        return cls([Box.of("wing", box, degrees)], **options)
+
+    @classmethod
     @override
     def build(
         cls,
         geometry: Any,
         *,
-        file: Path,
+        file: Path | None = None,
         units: Literal["m", "cm", "mm", "in", "ft"] | None = None,
         names: tuple[str, ...] | None = None,
+        wing: bool = False,
+        shape: tuple[int, int, int] | None = None,
+        component: str | None = None,
+        stations: tuple[float, ...] | None = None,
+        margin: float | tuple[float, float, float] = 0.05,
         degree: int | tuple[int, int, int] | None = None,
         outside: Outside = "refuse",
         freeze: tuple[str, ...] = (),
     ) -> "ControlVolume":
-        """From a case file: the boxes in a file."""
-        return cls.read(
-            file, units=units, names=names, degree=degree, outside=outside, freeze=freeze
-        )
+        """From a case file: the boxes in a file, or one along the geometry's wing."""
+        rest: dict[str, Any] = {"outside": outside, "freeze": freeze}
+        if file is not None and not wing:
+            return cls.read(file, units=units, names=names, degree=degree, **rest)
+        if file is not None or not wing or shape is None:
+            raise ParameterError("a control volume takes either file, or wing = true and shape")
+        rest |= {"component": component, "stations": stations, "margin": margin}
+        return cls.along_wing(geometry, shape, degree=degree or 3, **rest)
+
+    def refined(self, shape: int | Sequence[int]) -> tuple["ControlVolume", Transfer]:
+        """More control points that give the same shape: the volume, and the transfer of controls.
+
+        `transfer @ controls` moves every point by the fine volume as `controls` do by this one.
+        `shape` is how many each box is to have, or into how many parts each cell is cut.
+        """
+        return self._finer([cut(box.axes, shape, "keep") for box in self.frame.boxes])
+
+    def elevated(self, degree: int | Sequence[int]) -> tuple["ControlVolume", Transfer]:
+        """The same by polynomials of a higher degree."""
+        return self._finer([elevated(box.axes, degree, "keep") for box in self.frame.boxes])
+
+    def _finer(self, finer: Sequence[Finer]) -> tuple["ControlVolume", Transfer]:
+        boxes, weights = self.frame.finer(finer)
+        transfer, frozen = kept(weights, self.frozen)
+        fine = ControlVolume(boxes, outside=self.outside)
+        return eqx.tree_at(lambda volume: volume.frozen, fine, frozen), transfer
 
     @property
     @override

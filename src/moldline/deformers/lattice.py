@@ -1,6 +1,5 @@
 """A lattice: free-form deformation by a box of control points."""
 
-import math
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -10,17 +9,17 @@ import numpy as np
 from jaxtyping import Float, Int
 from typing_extensions import override
 
-from .._types import Array, Points, Vector, is_concrete
-from ..errors import GeometryError, ParameterError
+from .._types import Array, ArrayLike, Points, Vector, is_concrete
+from ..errors import ParameterError
+from ..mesh import Cloud
 from ..numerics import bspline
 from ..numerics.tensor_spline import evaluated
 from .base import AbstractBinding, DefinedBinding
 from .embedding import EmbeddedBinding, Embedding, Part
+from .generators import Align, crossed, exits, spanned, surrounding
 from .lattice_kernels import Following
 from .net import AXES, AbstractControlNet, grid_lines
-
-LONGEST, MOST = 512, 2**20
-"""Control points along an axis, and in all; more are a slip of the pen."""
+from .refinement import Finer, Transfer, counted, cut, elevated, kept
 
 Triple = tuple[int, int, int]
 Side = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
@@ -86,7 +85,7 @@ class Lattice(AbstractControlNet):
         _check_choice("ends", ends, bspline.Ends)
         _check_choice("outside", outside, bspline.Outside)
         _check_choice("basis", basis, Basis)
-        self.shape = _counts(shape)
+        self.shape = counted(shape)
         self.origin, self.edges = _spanning(origin, edges)
         self.inverse = np.linalg.inv(self.edges)
         self.ends, self.outside = ends, outside
@@ -109,14 +108,8 @@ class Lattice(AbstractControlNet):
     @classmethod
     def box(cls, low: Any, high: Any, shape: Sequence[int], **options: Any) -> "Lattice":
         """A lattice along the axes of space from one corner to the opposite one [m]."""
-        extent = np.asarray(high, float) - np.asarray(low, float)
-        flat = (extent <= 0) & (np.array(_counts(shape)) > 1)
-        if np.any(flat):
-            raise GeometryError(
-                f"a lattice from {list(map(float, low))} to {list(map(float, high))} is flat "
-                f"along {'xyz'[int(np.argmax(flat))]}; give that axis one control point"
-            )
-        return cls(low, np.diag(np.where(extent > 0, extent, 1.0)), shape, **options)
+        corners = np.asarray(low, float), np.asarray(high, float)
+        return cls(*spanned(*corners, counted(shape)), shape, **options)
 
     @classmethod
     def around(
@@ -132,18 +125,41 @@ class Lattice(AbstractControlNet):
         `margin` is what it is larger by at each side, as a fraction of the extent; three numbers
         for three axes.
         """
-        points = np.asarray(getattr(geometry, "points", geometry))
-        if component is not None:
-            if not hasattr(geometry, "component"):
-                raise ParameterError(
-                    f"component = {component!r}: a {type(geometry).__name__} has no components "
-                    "(one that is streamed neither); give low and high instead"
-                )
-            points = points[geometry.component(component)]
-        low, high = points.min(axis=0), points.max(axis=0)
-        with np.errstate(over="ignore", invalid="ignore"):  # refused below with what came out
-            room = np.broadcast_to(np.asarray(margin, float), 3) * (high - low)
-        return cls.box(low - room, high + room, shape, **options)
+        box = surrounding(geometry, counted(shape), margin, component)
+        return cls(*box, shape, **options)
+
+    @classmethod
+    def over(
+        cls,
+        geometry: Any,
+        shape: Sequence[int],
+        margin: float | Sequence[float] = 0.02,
+        component: str | None = None,
+        region: ArrayLike | None = None,
+        align: str = "axes",
+        freeze: Sequence[str] | None = None,
+        **options: Any,
+    ) -> "Lattice":
+        """A local lattice: over one component or a region, along its own axes where one wants.
+
+        It encloses the component's points inside the region, two opposite corners [m] that may be
+        infinite, and `margin` more; along the axes of space it ends where the region does. With
+        `align` "principal" its axes are the principal ones of what it covers, by area on a
+        surface, ordered and turned so that x, y and z are nearest to those of space. Sides that
+        mesh edges cross are frozen, so that nothing tears, unless `freeze` says which are.
+        """
+        counts = counted(shape)
+        box = surrounding(geometry, counts, margin, component, region, align)
+        sides = crossed(geometry, *box, counts) if freeze is None else tuple(freeze)
+        try:
+            return cls(*box, counts, freeze=sides, **options)
+        except ParameterError as error:
+            if freeze is not None or not sides:
+                raise
+            raise ParameterError(
+                f"the mesh crosses the sides {', '.join(sides)} of the box, which are therefore to "
+                f"stay: {error}; give more control points, or say which stay with freeze"
+            ) from None
 
     @classmethod
     @override
@@ -154,6 +170,8 @@ class Lattice(AbstractControlNet):
         shape: tuple[int, int, int],
         margin: float | tuple[float, float, float] = 0.02,
         component: str | None = None,
+        region: tuple[tuple[float, float, float], tuple[float, float, float]] | None = None,
+        align: Align = "axes",
         low: tuple[float, float, float] | None = None,
         high: tuple[float, float, float] | None = None,
         origin: tuple[float, float, float] | None = None,
@@ -163,20 +181,69 @@ class Lattice(AbstractControlNet):
         basis: Basis = "b-spline",
         degree: int | tuple[int, int, int] = 3,
         knots: tuple[tuple[float, ...] | None, ...] = (None, None, None),
-        freeze: tuple[Side, ...] = (),
+        freeze: tuple[Side, ...] | None = None,
     ) -> "Lattice":
-        """From a case file: by low and high, by origin and edges, else around the geometry."""
+        """From a case file: by low and high, by origin and edges, else around or over something."""
         rest: dict[str, Any] = {
-            "ends": ends, "outside": outside, "basis": basis,
-            "degree": degree, "knots": knots, "freeze": freeze,
+            "ends": ends, "outside": outside, "basis": basis, "degree": degree, "knots": knots
         }  # fmt: skip
         if (low is None) != (high is None) or (origin is None) != (edges is None):
             raise ParameterError("low goes with high, and origin with edges")
+        if region is not None or align != "axes":
+            if origin is not None or low is not None or isinstance(geometry, Cloud):
+                raise ParameterError(
+                    "region and align go over a geometry's points: not with low and high, origin "
+                    "and edges, or where it is streamed"
+                )
+            place: dict[str, Any] = {
+                "margin": margin,
+                "component": component,
+                "region": region,
+                "align": align,
+            }
+            return cls.over(geometry, shape, **place, freeze=freeze, **rest)
+        rest["freeze"] = freeze or ()
         if origin is not None:
             return cls(origin, edges, shape, **rest)
         if low is not None:
             return cls.box(low, high, shape, **rest)
         return cls.around(geometry, shape, margin, component, **rest)
+
+    def refined(self, shape: int | Sequence[int]) -> tuple["Lattice", Transfer]:
+        """More control points that give the same shape: the lattice, and the transfer of controls.
+
+        `transfer @ controls` moves every point by the fine lattice as `controls` do by this one.
+        `shape` is how many there are to be along each axis, or into how many parts each cell is
+        cut. Degrees stay; knots are inserted in the middle of the longest cells. Control points
+        that only frozen ones determine are frozen.
+        """
+        self._check_clamped()
+        return self._finer(cut(self.axes, shape, self.outside))
+
+    def elevated(self, degree: int | Sequence[int]) -> tuple["Lattice", Transfer]:
+        """The same by polynomials of a higher degree; an axis with one control point keeps it."""
+        self._check_clamped()
+        return self._finer(elevated(self.axes, degree, self.outside))
+
+    def _check_clamped(self) -> None:
+        if self.ends == "blender":
+            raise ParameterError(
+                "a lattice with ends = 'blender' cannot be refined: by Blender's rule more control "
+                "points do not span what fewer do; use ends = 'clamped'"
+            )
+
+    def _finer(self, finer: Finer) -> tuple["Lattice", Transfer]:
+        transfer, frozen = kept(finer.weights, self.frozen.ravel())
+        fine = Lattice(
+            self.origin,
+            self.edges,
+            [axis.size for axis in finer.axes],
+            outside=self.outside,
+            degree=[max(axis.degree, 1) for axis in finer.axes],
+            knots=[axis.interior.tolist() for axis in finer.axes],
+        )
+        shaped = frozen.reshape(fine.shape)
+        return eqx.tree_at(lambda lattice: lattice.frozen, fine, shaped), transfer
 
     @property
     @override
@@ -257,16 +324,7 @@ class Lattice(AbstractControlNet):
             return np.empty((0, 3)), np.empty(0)
         points = np.asarray(points)
         u = (points - self.origin) @ self.inverse
-        free = np.array(self.shape) == 1
-        inside = np.all(((u >= 0) & (u <= 1)) | free, axis=1)
-        start, end = np.asarray(edges).T
-        start, end = np.where(inside[start], (start, end), (end, start))
-        crossing = inside[start] & ~inside[end]
-        start, end = start[crossing], end[crossing]
-        step = np.where(free, 0.0, u[end] - u[start])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = np.where(step > 0, (1 - u[start]) / step, -u[start] / step)
-        share = np.nanmin(np.where(step == 0, np.inf, reach), axis=1, initial=1.0)
+        start, end, share, _ = exits(u, edges, np.array(self.shape) == 1)
         places = points[start] + (1 - 1e-9) * share[:, None] * (points[end] - points[start])
         gaps = np.asarray(self(places, jnp.asarray(controls))) - places
         return places, np.linalg.norm(gaps, axis=1)
@@ -291,17 +349,6 @@ def _frozen(
     if frozen.all():
         raise ParameterError(f"freezing {', '.join(sides)} leaves no free control point in {shape}")
     return frozen
-
-
-def _counts(shape: Sequence[int]) -> Triple:
-    if len(shape) != 3 or any(n != int(n) or n < 1 for n in shape):
-        raise ParameterError(f"a lattice has three counts of at least 1, got {tuple(shape)}")
-    if max(shape) > LONGEST or math.prod(map(int, shape)) > MOST:
-        raise ParameterError(
-            f"a lattice has at most {LONGEST} points along an axis and {MOST} in all, got "
-            f"{tuple(shape)}; give fewer"
-        )
-    return int(shape[0]), int(shape[1]), int(shape[2])
 
 
 def _spanning(origin: Any, edges: Any) -> tuple[np.ndarray, np.ndarray]:

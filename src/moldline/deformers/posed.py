@@ -5,35 +5,25 @@ from collections.abc import Callable
 
 import equinox as eqx
 import jax
-import numpy as np
+from jaxtyping import Float
 from typing_extensions import override
 
-from .._types import Points, Vector
+from .._types import Array, Points, Vector
 from .base import AbstractBinding, AbstractDeformer
-from .net import AbstractControlNet
+from .named import AbstractNamed
 
 
-class AbstractPosed(AbstractDeformer):
+class AbstractPosed(AbstractNamed):
     """A deformer of named parameters in two phases: they move control points, these the geometry.
 
     What is asked of the second phase, speed and smoothness, is the net's.
     """
 
-    net: eqx.AbstractVar[AbstractControlNet]
+    net: eqx.AbstractVar[AbstractDeformer]
     """What moves the geometry."""
 
-    @property
     @abc.abstractmethod
-    def parameters(self) -> dict[str, np.ndarray]:
-        """Numbers of the controls by the name of what they change, such as "twist"."""
-
-    @property
-    @abc.abstractmethod
-    def values(self) -> Vector:
-        """What the parameters measure at rest [m, rad, 1], one number for each control."""
-
-    @abc.abstractmethod
-    def pose(self, controls: Vector) -> Vector:
+    def pose(self, controls: Vector) -> Float[Array, "n"]:
         """The net's controls; plain JAX, and exactly zero where the controls are."""
 
     @override

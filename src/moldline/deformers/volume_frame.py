@@ -6,6 +6,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.sparse
 from jaxtyping import Float
 from typing_extensions import override
 
@@ -16,9 +17,13 @@ from ..numerics import bspline
 from ..numerics.inversion import Locator, Places, Volume
 from ..numerics.kernel import AbstractKernel, Arrays, empty
 from ..numerics.tensor_spline import evaluated
+from .refinement import Finer
 
 SHARED = 1e-8
 """Control points nearer than this, in sizes of all boxes, are one."""
+
+SAME = 1e-12
+"""Weights of one control point by two boxes may differ by this."""
 
 SIDES = ("i-", "i+", "j-", "j+", "k-", "k+")
 
@@ -86,6 +91,41 @@ class Frame:
             inside = (places[:, 3] == number)[:, None]
             total = jnp.where(inside, evaluated(box.axes, places[:, :3], moves[index]), total)
         return total
+
+    def finer(self, finer: Sequence[Finer]) -> tuple[list[Box], scipy.sparse.csr_array]:
+        """Boxes with more control points, and the weights (fine, coarse) of all that are different.
+
+        Raises ParameterError where a face that two boxes share would no longer be one.
+        """
+        boxes, rows = [], []
+        for box, index, (axes, weights) in zip(self.boxes, self.index, finer, strict=True):
+            shape = [axis.size for axis in axes]
+            boxes.append(
+                Box(box.name, axes, (weights @ box.points.reshape(-1, 3)).reshape(*shape, 3))
+            )
+            entries = (np.ones(index.size), (np.arange(index.size), index.ravel()))
+            chosen = scipy.sparse.csr_array(entries, shape=(index.size, len(self.rest)))
+            rows.append(weights @ chosen)
+        fine = Frame(boxes)
+        number = np.concatenate([index.ravel() for index in fine.index])
+        every = scipy.sparse.csr_array(scipy.sparse.vstack(rows))
+        kept = every[np.unique(number, return_index=True)[1]]
+        own, other = fine.membership(), self.membership()
+        # what only control points of a shared face determine must itself be shared
+        torn = ((kept != 0).astype(float) @ (1.0 - other) == 0) & (own == 0)
+        if torn.any() or abs(every - kept[number]).max() > SAME:
+            raise ParameterError(
+                "boxes that share a face must be refined alike there: give a whole number of parts "
+                "of each cell, and mind that degrees and knots agree on both sides"
+            )
+        return boxes, kept
+
+    def membership(self) -> Float[np.ndarray, "m boxes"]:
+        """1 where a control point belongs to a box."""
+        found = np.zeros((len(self.rest), len(self.boxes)))
+        for box, index in enumerate(self.index):
+            found[index.ravel(), box] = 1.0
+        return found
 
     def sides(self, chosen: Sequence[str]) -> np.ndarray:
         """Which control points lie next to the named sides, as many rows as motion needs to fade.

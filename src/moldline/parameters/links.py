@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 from .._types import Array
 from ..deformers.base import AbstractDeformer
 from ..deformers.lattice import Lattice
+from ..deformers.named import AbstractNamed
 from ..deformers.net import AXES, AbstractControlNet
-from ..deformers.posed import AbstractPosed
 from ..errors import ParameterError
 from .link import Across, Link
 
@@ -32,25 +32,25 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
 
 
 def named(
-    posed: AbstractPosed,
+    deformer: AbstractNamed,
     parameter: str,
     index: Sequence[int] | None = None,
     absolute: bool = False,
 ) -> Link:
-    """One variable number for each number of a skeleton's parameter, or for those given by index.
+    """One variable number for each number of a parameter, or for those given by index.
 
     The numbers are changes; with `absolute` they are what the parameter measures itself, such as a
     sweep of 35 degrees.
     """
-    known = posed.parameters
+    known = deformer.parameters
     if parameter not in known:
         raise ParameterError(f"no parameter {parameter!r}; there is: {', '.join(known)}")
     chosen = range(len(known[parameter])) if index is None else index
     _check_numbers(chosen, len(known[parameter]), f"the numbers of {parameter!r}")
-    link = controls(posed, [int(known[parameter][i]) for i in chosen])
+    link = controls(deformer, [int(known[parameter][i]) for i in chosen])
     if not absolute:
         return link
-    return Link(link.matrix, rest=link.matrix @ (link.matrix.T @ np.asarray(posed.values)))
+    return Link(link.matrix, rest=link.matrix @ (link.matrix.T @ np.asarray(deformer.values)))
 
 
 def each(net: AbstractControlNet, axis: AxisName, **where: Any) -> Link:

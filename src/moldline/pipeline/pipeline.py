@@ -91,12 +91,14 @@ class Pipeline(eqx.Module):
         state = {name: self.geometries[name].points for name in needed}
         for number, stage in enumerate(self._on(self.result)):
             controls = stage.controls(full)
-            if stage.settles:
-                controls = stage.deformer.settle(state[base], controls)
+            bound = number == 0 or stage.carried
+            moving = stage.deformer
+            if stage.settles and not bound:
+                moving, controls = stage.deformer.settle(state[base], controls)
             for name in needed:
                 rest = self.geometries[name].points
-                if number not in self.bindings[name]:
-                    moved = stage.deformer.follow(state[name], controls)
+                if not bound:
+                    moved = moving.follow(state[name], controls)
                 else:
                     moved = self.bindings[name][number](controls)
                     if number > 0:

@@ -1,11 +1,12 @@
 """LOOK: pictures without a display and without OpenGL."""
 
+from ..mesh.slices import cut
 from .faults import of_faults
 from .figure import save
 from .nets import Net, draw_net
 from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
 from .reflections import of_reflections
-from .sections import cut, draw_section, section_picture
+from .sections import draw_section, section_picture
 from .surfaces import before_and_after, draw_surface, sensitivity_map
 from .view import View
 

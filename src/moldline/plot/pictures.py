@@ -129,7 +129,9 @@ def _nets(pipeline: Pipeline) -> list[tuple[Stage, AbstractControlNet]]:
     for stage in pipeline.own_stages:
         if isinstance(stage.deformer, AbstractControlNet):
             found.append((stage, stage.deformer))
-        elif isinstance(stage.deformer, AbstractPosed):
+        elif isinstance(stage.deformer, AbstractPosed) and isinstance(
+            stage.deformer.net, AbstractControlNet
+        ):
             found.append((stage, stage.deformer.net))
     return found
 

@@ -1,4 +1,4 @@
-"""Airfoil sections, and the sections that planes cut from surfaces."""
+"""Drawn sections: airfoils, and what planes cut from surfaces."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -10,26 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..errors import ParameterError
+from ..mesh.slices import axis_number, cut
 from .figure import blank
 from .nets import DARK, DASHES, GREY, RED, Net
-
-
-def cut(points: Any, faces: Any, axis: str, at: float) -> list[np.ndarray]:
-    """The polylines, each (p, 3), in which a plane x, y or z = `at` cuts a triangulation.
-
-    A closed one ends with its first point. Points that lie in the plane count as below it.
-    """
-    points, faces = np.asarray(points, float), np.asarray(faces)
-    height = points[:, _number(axis)] - at
-    above = height[faces] > 0
-    crossed = faces[above.any(axis=1) & ~above.all(axis=1)]
-    sides = np.sort(np.stack([crossed, np.roll(crossed, -1, axis=1)], axis=-1), axis=-1)
-    splits = (height[sides] > 0).sum(axis=-1) == 1  # two sides of each crossed face
-    ends, pairs = np.unique(sides[splits], axis=0, return_inverse=True)
-    low, high = ends.T
-    share = height[low] / np.where(low != high, height[low] - height[high], 1.0)
-    places = points[low] + share[:, None] * (points[high] - points[low])
-    return [places[chain] for chain in _chains(pairs.reshape(-1, 2))]
 
 
 def draw_section(
@@ -40,7 +23,7 @@ def draw_section(
     plane: str = "xy",
 ) -> None:
     """Draw a curve: at rest dashed, deformed solid, moved control points red."""
-    i, j = (_number(name) for name in plane)
+    i, j = (axis_number(name) for name in plane)
     points = np.asarray(points)
     if moved is None:
         axes.plot(points[:, i], points[:, j], color=DARK, lw=1.5)
@@ -69,7 +52,7 @@ def section_picture(
     styles = [(points, DASHES, GREY, 1.2, "before"), (moved, "-", DARK, 1.5, "after")]
     figure = blank(10.0, 2.0 * len(stations) + 0.6)
     rows = np.atleast_1d(figure.subplots(len(stations), 1))
-    i, j = (k for k in range(3) if k != _number(axis))
+    i, j = (k for k in range(3) if k != axis_number(axis))
     for panel, at in zip(rows, stations, strict=True):
         for shape, style, colour, width, _ in styles:
             lines = [line[:, [i, j]] for line in _section(shape, faces, axis, at)]
@@ -91,39 +74,9 @@ def section_picture(
 def _section(points: Any, faces: Any, axis: str, at: float) -> list[np.ndarray]:
     lines = cut(points, faces, axis, at)
     if not lines:
-        along = np.asarray(points)[:, _number(axis)]
+        along = np.asarray(points)[:, axis_number(axis)]
         raise ParameterError(
             f"there is no section at {axis} = {at:g}; the surface reaches from "
             f"{along.min():g} to {along.max():g}"
         )
     return lines
-
-
-def _number(axis: str) -> int:
-    if axis not in ("x", "y", "z"):
-        raise ParameterError(f"an axis is x, y or z, got {axis!r}")
-    return "xyz".index(axis)
-
-
-def _chains(pairs: np.ndarray) -> list[list[int]]:
-    """Chains of numbers that cover all pairs, each pair once; a closed one repeats its first."""
-    near: dict[int, list[int]] = {}
-    for number, pair in enumerate(pairs.tolist()):
-        for end in pair:
-            near.setdefault(end, []).append(number)
-    unused = set(range(len(pairs)))
-
-    def onward(here: int) -> list[int]:
-        chain = []
-        while (number := next((n for n in near[here] if n in unused), None)) is not None:
-            unused.remove(number)
-            here = int(pairs[number].sum()) - here
-            chain.append(here)
-        return chain
-
-    chains = []
-    loose = [end for end, touching in near.items() if len(touching) == 1]
-    for start in [*loose, *near]:  # open chains from one of their ends, then closed ones
-        if any(number in unused for number in near[start]):
-            chains.append([start, *onward(start)])
-    return chains

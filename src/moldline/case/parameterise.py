@@ -1,0 +1,197 @@
+"""A case file to begin with, made for a geometry."""
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from .. import registry
+from ..deformers.posed import AbstractPosed
+from ..errors import GeometryError, ParameterError
+from ..mesh import Geometry, Section, Surface
+from ..mesh.io import METRES, read, write
+from ..mesh.io.files import replacing
+from ..parameters.variable import UNITS
+from .case import Case, load
+
+ALONG = 8
+"""Control points along the longest side of a lattice, where nothing else is asked for."""
+
+BOUND = 0.25
+"""Bounds of a motion, in spacings of control points; of a length, in parts of it."""
+
+TURN = 15.0
+"""Bounds of an angle, to each side [deg]."""
+
+ANGLES = ("sweep", "dihedral", "twist", "rotation", "angle")
+"""Parameters that are angles."""
+
+
+@dataclass
+class Draft:
+    """What a kind of parameterisation puts into a case file.
+
+    Attributes
+    ----------
+    stage
+        The stage's own keys.
+    why
+        How many controls, and why as many.
+    variables
+        Tables of variables by name.
+    links
+        Tables of links.
+    beside
+        Geometries to write beside the case file, by the end of their name.
+    """
+
+    stage: dict[str, Any]
+    why: str
+    variables: dict[str, Any] = field(default_factory=dict)
+    links: list[dict[str, Any]] = field(default_factory=list)
+    beside: dict[str, Surface] = field(default_factory=dict)
+
+    def add(self, name: str, link: Mapping[str, Any], size: int, bound: float, unit: str) -> None:
+        """A variable and its link; zero at rest."""
+        low_high = [-_rounded(bound), _rounded(bound)]
+        self.variables[name] = {"size": size, "value": 0.0, "bounds": low_high, "unit": unit}
+        self.links.append({"variable": name, **link})
+
+
+def parameterise(
+    source: Path, target: Path, kind: str, units: str | None = None, **options: Any
+) -> tuple[Case, str]:
+    """Write a case file for a geometry's file; gives the case, and why it is as it is.
+
+    `options` are those of the kind, see `KINDS`. Lengths in them, and in the file, are metres where
+    `units` says what the geometry's are, else the geometry's own.
+    """
+    if kind not in KINDS:
+        raise ParameterError(f"no kind {kind!r}; there is: {', '.join(KINDS)}")
+    geometry = read(source, units=units)
+    try:
+        draft = KINDS[kind](geometry, **{k: v for k, v in options.items() if v is not None})
+    except TypeError as error:
+        wrong = re.search(r"argument '(\w+)'", str(error))
+        raise ParameterError(f"{kind} takes no {wrong[1] if wrong else error}") from None
+    for ending, surface in draft.beside.items():
+        beside = target.with_name(f"{target.stem}{ending}")
+        write(beside, surface)
+        draft.stage["file"] = beside.name
+    name = re.sub(r"\W", "_", source.stem) or "geometry"
+    table = {"file": _beside(source, target)} | ({"units": units} if units else {})
+    tables = {
+        "moldline": 1,
+        "geometry": {name: table},
+        "variable": draft.variables,
+        "stage": [{**draft.stage, "link": draft.links}],
+    }
+    with replacing(target) as stream:
+        stream.write(_headed(draft.why, source).encode())
+        stream.write(tomli_w.dumps(tables).encode())
+    return load(target), draft.why
+
+
+def _headed(why: str, source: Path) -> str:
+    return f"# made for {source.name} by moldline parameterise; edit it\n# {why}\n\n"
+
+
+def _beside(source: Path, target: Path) -> str:
+    """The source's path as the case file names it."""
+    folder, place = target.parent.resolve(), source.resolve()
+    return place.relative_to(folder).as_posix() if place.is_relative_to(folder) else str(place)
+
+
+def lattice(
+    geometry: Geometry, *, shape: tuple[int, int, int] | None = None, **options: Any
+) -> Draft:
+    """A box around it all or a part, each control point moving along the box's three axes."""
+    if isinstance(geometry, Section):
+        return _section_lattice(shape or (10, 2, 1))
+    made = registry.deformer("lattice")
+    extent = made.over(geometry, (2, 2, 2), **options).edges
+    lengths = np.linalg.norm(extent, axis=1)
+    spacing = lengths.max() / (ALONG - 1)
+    counts = shape or tuple(int(n) for n in np.clip(np.rint(lengths / spacing) + 1, 2, ALONG))
+    mirror: dict[str, Any] = {}
+    on_plane = bool(np.any(geometry.points[:, 1] == 0)) and not np.any(geometry.points[:, 1] < 0)
+    if on_plane and not options:
+        mirror = {"mirrored": "y"}
+        options = {"margin": [0.02, 0.0, 0.05]}  # begins in the plane, so that points stay on it
+    draft = Draft(
+        {"deformer": "lattice", "shape": list(counts), **options},
+        f"{counts[0]} x {counts[1]} x {counts[2]} control points: "
+        + ("as asked for" if shape else f"{ALONG} along the longest side, as dense along others")
+        + "; each acts on about two spacings to each side of it",
+    )
+    for axis, length, count in zip("xyz", lengths, counts, strict=True):
+        if count > 1:
+            link = {"link": "each", "axis": axis} | mirror
+            step = BOUND * length / (count - 1)
+            draft.add(f"move_{axis}", link, math.prod(counts), step, "m")
+    return draft
+
+
+def _section_lattice(shape: tuple[int, int, int]) -> Draft:
+    draft = Draft(
+        {"deformer": "lattice", "shape": list(shape), "margin": [0.02, 0.1, 0.0]},
+        f"{shape[0]} stations along the chord, at each a number for thickness and one for camber",
+    )
+    for name in ("thickness", "camber"):
+        link = {"link": name, "along": "x", "axis": "y"}
+        draft.add(name, link, shape[0], 0.05, "m")
+    return draft
+
+
+def posed(name: str) -> Callable[..., Draft]:
+    """A kind whose parameters have names and measure something: the skeletons."""
+
+    def drafted(geometry: Geometry, **options: Any) -> Draft:
+        if not isinstance(geometry, Surface):
+            raise GeometryError(f"a {name.replace('_', ' ')} needs a surface of triangles")
+        deformer: AbstractPosed = registry.deformer(name).build(geometry, **options)
+        draft = Draft({"deformer": name, **_plain(options)}, "")
+        for parameter, numbers in deformer.parameters.items():
+            _add_measured(draft, parameter, np.asarray(deformer.values)[numbers])
+        total = sum(len(numbers) for numbers in deformer.parameters.values())
+        listed = ", ".join(f"{len(n)} of {p}" for p, n in deformer.parameters.items())
+        draft.why = f"{total} numbers: {listed}; they measure what they are named for"
+        return draft
+
+    return drafted
+
+
+def _add_measured(draft: Draft, parameter: str, values: np.ndarray) -> None:
+    is_angle = parameter.rpartition(".")[2] in ANGLES
+    own = values / UNITS["deg"] if is_angle else values
+    reach = np.full(len(own), TURN) if is_angle else BOUND * np.maximum(np.abs(own), 1e-3)
+    pairs = [[_rounded(v - r), _rounded(v + r)] for v, r in zip(own, reach, strict=True)]
+    name = parameter.replace(".", "_")
+    unit = "deg" if is_angle else "m"
+    draft.variables[name] = {"value": own.tolist(), "bounds": pairs, "unit": unit}
+    link = {"variable": name, "link": "named", "parameter": parameter, "absolute": True}
+    draft.links.append(link)
+
+
+def _plain(options: Mapping[str, Any]) -> dict[str, Any]:
+    return {k: list(v) if isinstance(v, tuple) else v for k, v in options.items()}
+
+
+def _rounded(number: float) -> float:
+    """Three digits: a bound is a judgement."""
+    return float(f"{number:.3g}")
+
+
+KINDS: dict[str, Callable[..., Draft]] = {
+    "lattice": lattice,
+    "wing-skeleton": posed("wing_skeleton"),
+    "body-skeleton": posed("body_skeleton"),
+}
+"""Kinds of parameterisation by the name that the command line calls them."""
+
+__all__ = ["KINDS", "METRES", "Draft", "parameterise"]

@@ -1,0 +1,1 @@
+"""MEASURE: differentiable numbers taken from a shape."""

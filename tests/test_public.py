@@ -6,9 +6,10 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "Cloud", "ControlVolume",
-    "Geometry", "Grid", "Lattice", "LinearBinding", "Link", "Pipeline", "Section", "Stage",
-    "Surface", "Variable", "VolumeMesh", "errors", "links", "load", "plot", "read",
+    "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "BodySkeleton", "Bone", "Bones",
+    "Cage", "Cloud", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Lattice",
+    "LinearBinding", "Link", "Pipeline", "Planform", "Section", "Skeleton", "Stage", "Surface",
+    "Variable", "VolumeMesh", "WingSkeleton", "planform", "errors", "links", "load", "plot", "read",
     "read_sensitivities", "variable", "write", "write_sensitivities",
 }  # fmt: skip
 

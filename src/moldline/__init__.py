@@ -17,12 +17,20 @@ if TYPE_CHECKING:
     from . import errors, plot
     from .case import load
     from .deformers.base import AbstractBinding, AbstractDeformer, LinearBinding
+    from .deformers.body_skeleton import BodySkeleton
+    from .deformers.bones import Bone, Bones
+    from .deformers.cage import Cage
     from .deformers.control_volume import ControlVolume
+    from .deformers.direct_skeleton import DirectSkeleton
     from .deformers.foreign import AbstractNumpyDeformer
+    from .deformers.hinge import Hinge
     from .deformers.lattice import Lattice
+    from .deformers.skeleton import Skeleton
+    from .deformers.wing_skeleton import WingSkeleton
     from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
     from .mesh.io import read, write
     from .mesh.io.sensitivities import read_sensitivities, write_sensitivities
+    from .mesh.planform import Planform, planform
     from .parameters import links
     from .parameters.link import Link
     from .parameters.variable import Variable, variable
@@ -33,22 +41,32 @@ _HOMES = {
     "AbstractBinding": "deformers.base",
     "AbstractDeformer": "deformers.base",
     "AbstractNumpyDeformer": "deformers.foreign",
+    "BodySkeleton": "deformers.body_skeleton",
+    "Bone": "deformers.bones",
+    "Bones": "deformers.bones",
+    "Cage": "deformers.cage",
     "Cloud": "mesh",
     "ControlVolume": "deformers.control_volume",
+    "DirectSkeleton": "deformers.direct_skeleton",
     "Geometry": "mesh",
     "Grid": "mesh",
+    "Hinge": "deformers.hinge",
     "Lattice": "deformers.lattice",
     "LinearBinding": "deformers.base",
     "Link": "parameters.link",
+    "Planform": "mesh.planform",
     "Pipeline": "pipeline.pipeline",
     "Section": "mesh",
+    "Skeleton": "deformers.skeleton",
     "Stage": "pipeline.stage",
     "Surface": "mesh",
     "Variable": "parameters.variable",
     "VolumeMesh": "mesh",
+    "WingSkeleton": "deformers.wing_skeleton",
     "errors": "",
     "links": "parameters",
     "load": "case",
+    "planform": "mesh.planform",
     "plot": "",
     "read": "mesh.io",
     "read_sensitivities": "mesh.io.sensitivities",

@@ -1,5 +1,6 @@
 """A case file to begin with, made for a geometry."""
 
+import json
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -8,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from .. import registry
 from ..deformers.posed import AbstractPosed
@@ -92,13 +92,27 @@ def parameterise(
         "stage": [{**draft.stage, "link": draft.links}],
     }
     with replacing(target) as stream:
-        stream.write(_headed(draft.why, source).encode())
-        stream.write(tomli_w.dumps(tables).encode())
+        stream.write(f"# made for {source.name} by moldline parameterise; edit it\n".encode())
+        stream.write(f"# {draft.why}\n{_toml(tables)}".encode())
     return load(target), draft.why
 
 
-def _headed(why: str, source: Path) -> str:
-    return f"# made for {source.name} by moldline parameterise; edit it\n# {why}\n\n"
+def _toml(table: Mapping[str, Any], name: str = "") -> str:
+    """Tables as a person writes them: an array to a line, what belongs together in one place."""
+    inner = {k: v for k, v in table.items() if isinstance(v, dict) or _is_tables(v)}
+    lines = [f"{k} = {json.dumps(v)}\n" for k, v in table.items() if k not in inner]
+    for key, value in inner.items():
+        path = f"{name}.{key}" if name else key
+        if isinstance(value, dict):
+            has_own = not all(isinstance(v, dict) for v in value.values())
+            lines.append((f"\n[{path}]\n" if has_own else "") + _toml(value, path))
+        else:
+            lines += [f"\n[[{path}]]\n{_toml(row, path)}" for row in value]
+    return "".join(lines)
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
 
 
 def _beside(source: Path, target: Path) -> str:

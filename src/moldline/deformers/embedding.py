@@ -1,5 +1,6 @@
 """Fixed points in splines, and the compiled kernels of their motion, each other's derivatives."""
 
+import abc
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -38,11 +39,36 @@ class Part(NamedTuple):
     rows: np.ndarray | None
 
 
-class Embedding:
-    """Fixed points in some splines, sorted by cell; its kernels take displacements of controls.
+class AbstractEmbedding(abc.ABC):
+    """Fixed points in a net of control points; its kernels take displacements of these.
 
     Compared by identity, as its kernels are.
     """
+
+    points: np.ndarray
+    count: int
+    """Control points."""
+    field: Callable[[Array], Array]
+    """Control displacements to those of the points, in plain JAX."""
+    displace: "Displacement"
+    move: "Motion"
+    gather: "Gathering"
+
+    @abc.abstractmethod
+    def displaced(self, moves: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
+        """Displacements of the points, added to `rest` where given."""
+
+    @abc.abstractmethod
+    def gathered(self, vectors: np.ndarray) -> np.ndarray:
+        """The transpose: cotangents of the control points from those of the points."""
+
+    @abc.abstractmethod
+    def matrix(self) -> scipy.sparse.csr_array:
+        """Weight of each control point at each point, shape (n, count)."""
+
+
+class Embedding(AbstractEmbedding):
+    """Fixed points in some splines, sorted by cell."""
 
     def __init__(
         self, points: np.ndarray, parts: Sequence[Part], count: int, field: Callable[[Array], Array]
@@ -50,9 +76,7 @@ class Embedding:
         self.points = points
         self.parts = tuple(parts)
         self.count = count
-        """Control points."""
         self.field = field
-        """Control displacements to those of the points, in plain JAX."""
         self.blocks = [cellwise.blocks(part.axes, part.u, part.rows) for part in parts]
         self.weights = [cellwise.Weights.of(part.axes) for part in parts]
         self.covers = any(part.rows is None for part in parts)
@@ -60,8 +84,8 @@ class Embedding:
         self.move = Motion(self)
         self.gather = Gathering(self)
 
+    @override
     def displaced(self, moves: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
-        """Displacements of the points, added to `rest` where given."""
         out = empty(self.points.shape)
         if not self.covers:
             out[:] = 0.0 if rest is None else rest
@@ -69,15 +93,15 @@ class Embedding:
             cellwise.displaced(blocks, weights, moves[part.controls], rest, out)
         return out
 
+    @override
     def gathered(self, vectors: np.ndarray) -> np.ndarray:
-        """The transpose: cotangents of the control points from those of the points."""
         total = np.zeros((self.count, 3))
         for part, blocks, weights in zip(self.parts, self.blocks, self.weights, strict=True):
             np.add.at(total, part.controls, cellwise.pulled_back(blocks, weights, vectors))
         return total
 
+    @override
     def matrix(self) -> scipy.sparse.csr_array:
-        """Weight of each control point at each point, shape (n, count)."""
         total = scipy.sparse.csr_array((len(self.points), self.count))
         for part in self.parts:
             own = cellwise.matrix(part.axes, part.u).tocoo()
@@ -91,7 +115,7 @@ class Embedding:
 class Displacement(AbstractKernel):
     """Control displacements to point displacements: linear."""
 
-    def __init__(self, embedding: Embedding):
+    def __init__(self, embedding: AbstractEmbedding):
         self.embedding = embedding
 
     @override
@@ -114,7 +138,7 @@ class Displacement(AbstractKernel):
 class Motion(AbstractKernel):
     """Control displacements to moved points: the displacement kernel with the rest added in it."""
 
-    def __init__(self, embedding: Embedding):
+    def __init__(self, embedding: AbstractEmbedding):
         self.embedding = embedding
 
     @override
@@ -133,7 +157,7 @@ class Motion(AbstractKernel):
 class Gathering(AbstractKernel):
     """Point cotangents to control cotangents: the transpose of the displacement, linear too."""
 
-    def __init__(self, embedding: Embedding):
+    def __init__(self, embedding: AbstractEmbedding):
         self.embedding = embedding
 
     @override
@@ -155,10 +179,10 @@ class Gathering(AbstractKernel):
 
 
 class EmbeddedBinding(AbstractBinding):
-    """A net of control points on fixed points: sorted by cell once, one pass per deformation."""
+    """A net of control points on fixed points: embedded once, one pass per deformation."""
 
     net: AbstractControlNet
-    embedding: Embedding = eqx.field(static=True)
+    embedding: AbstractEmbedding = eqx.field(static=True)
 
     @override
     def __call__(self, controls: Vector) -> Points:

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from .._types import Array, Vector
+from .._types import Array
 
 RANK = 1e-9
 """Singular values below this part of the largest are those of dependent conditions."""
@@ -26,10 +26,13 @@ LIMIT = 60
 HALVINGS = 25
 """Of a step that makes it no better."""
 
-Conditions = Callable[[Vector], Vector]
+Unknown = Float[Array, "n"]
+Misses = Float[Array, "r"]
+Both = Float[Array, "both"]
+Conditions = Callable[[Unknown], Misses]
 
-Slopes = Callable[[Vector], tuple[Vector, Array]]
-"""Values and slopes, shape (k, n), of conditions."""
+Slopes = Callable[[Unknown], tuple[Misses, Float[Array, "r n"]]]
+"""Values and slopes of conditions."""
 
 
 class Solution(NamedTuple):
@@ -59,12 +62,12 @@ def independent(slopes: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "n"
 
 def least_norm(
     conditions: Conditions,
-    wanted: Vector,
-    weights: Vector,
+    wanted: Misses,
+    weights: Unknown,
     tolerance: float,
     rounding: float,
     slopes: Slopes | None = None,
-    damping: Vector | float = 1.0,
+    damping: Misses | float = 1.0,
 ) -> Solution:
     """Solve from zero for independent conditions; x is differentiable in all that they close over.
 
@@ -77,10 +80,10 @@ def least_norm(
     """
     known = slopes or (lambda x: (conditions(x), jax.jacrev(conditions)(x)))
 
-    def missing(x: Vector) -> Vector:
+    def missing(x: Unknown) -> Misses:
         return conditions(x) - wanted
 
-    def evaluated(x: Vector) -> tuple[Vector, Array]:
+    def evaluated(x: Unknown) -> tuple[Misses, Float[Array, "r n"]]:
         values, rows = known(x)
         return values - wanted, rows
 
@@ -92,19 +95,19 @@ def least_norm(
 def _search(
     missing: Conditions,
     evaluated: Slopes,
-    weights: Vector,
+    weights: Unknown,
     tolerance: float,
     rounding: float,
-    damping: Vector | float,
+    damping: Misses | float,
 ) -> Solution:
-    def target(x: Vector) -> tuple[Vector, Vector]:
+    def target(x: Unknown) -> tuple[Unknown, Misses]:
         """Of the linearised conditions the least x, and its multipliers."""
         miss, slopes = evaluated(x)
         spread = slopes / weights
         multipliers = jnp.linalg.solve(spread @ slopes.T, damping * miss - slopes @ x)
         return -(multipliers @ spread), multipliers
 
-    def merit(x: Vector, price: Vector) -> Float[Array, ""]:
+    def merit(x: Unknown, price: Float[Array, ""]) -> Float[Array, ""]:
         return 0.5 * x @ (weights * x) + price * jnp.sum(jnp.abs(missing(x)))
 
     def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
@@ -135,12 +138,12 @@ def _search(
 
 
 def _differentiable(
-    missing: Conditions, evaluated: Slopes, weights: Vector, found: Vector
-) -> Vector:
+    missing: Conditions, evaluated: Slopes, weights: Unknown, found: Unknown
+) -> Unknown:
     """The solution with the derivatives of the conditions that it meets."""
     count = len(weights)
 
-    def balance(unknown: Vector) -> Vector:
+    def balance(unknown: Both) -> Both:
         x, multipliers = unknown[:count], unknown[count:]
         miss, pull = jax.vjp(missing, x)
         return jnp.concatenate([weights * x + pull(multipliers)[0], miss])
@@ -151,16 +154,16 @@ def _differentiable(
     small = spread @ slopes.T
     multipliers = jnp.linalg.solve(small, -(slopes @ x))
 
-    def flat(vector: Vector) -> Vector:
+    def flat(vector: Both) -> Both:
         """The inverse where the conditions have no curvature."""
         one, other = vector[:count], vector[count:]
         inner = jnp.linalg.solve(small, spread @ one - other)
         return jnp.concatenate([(one - slopes.T @ inner) / weights, inner])
 
-    def solve(matvec: Callable[[Vector], Vector], right: Vector) -> Vector:
+    def solve(matvec: Callable[[Both], Both], right: Both) -> Both:
         return _refined(matvec, flat, right)
 
-    def tangent(linear: Callable[[Vector], Vector], right: Vector) -> Vector:
+    def tangent(linear: Callable[[Both], Both], right: Both) -> Both:
         return jax.lax.custom_linear_solve(linear, right, solve, symmetric=True)
 
     unknown = jnp.concatenate([x, multipliers])
@@ -168,9 +171,7 @@ def _differentiable(
     return root[:count]
 
 
-def _refined(
-    matvec: Callable[[Vector], Vector], flat: Callable[[Vector], Vector], right: Vector
-) -> Vector:
+def _refined(matvec: Callable[[Both], Both], flat: Callable[[Both], Both], right: Both) -> Both:
     """Solve by GMRES, begun and preconditioned by the flat inverse."""
     solution, _ = jax.scipy.sparse.linalg.gmres(
         matvec, right, x0=flat(right), M=flat, tol=1e-13, atol=0.0, restart=30, maxiter=10

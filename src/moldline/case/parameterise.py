@@ -14,7 +14,7 @@ from .. import registry
 from ..deformers.posed import AbstractPosed
 from ..errors import GeometryError, ParameterError
 from ..mesh import Geometry, Section, Surface
-from ..mesh.io import METRES, read, write
+from ..mesh.io import read, write
 from ..mesh.io.files import replacing
 from ..parameters.variable import UNITS
 from .case import Case, load
@@ -81,8 +81,8 @@ def parameterise(
         raise ParameterError(f"{kind} takes no {wrong[1] if wrong else error}") from None
     for ending, surface in draft.beside.items():
         beside = target.with_name(f"{target.stem}{ending}")
-        write(beside, surface)
-        draft.stage["file"] = beside.name
+        write(beside, surface, units=units)
+        draft.stage |= {"file": beside.name} | ({"units": units} if units else {})
     name = re.sub(r"\W", "_", source.stem) or "geometry"
     table = {"file": _beside(source, target)} | ({"units": units} if units else {})
     tables = {
@@ -151,6 +151,45 @@ def lattice(
     return draft
 
 
+def wing_lattice(
+    geometry: Geometry, *, shape: tuple[int, int, int] | None = None, **options: Any
+) -> Draft:
+    """A swept, tapered box along a wing; stations rise, and sections move up and grow thicker."""
+    counts = shape or (7, 5, 2)
+    made = registry.deformer("control_volume").build(geometry, wing=True, shape=counts, **options)
+    draft = Draft(
+        {"deformer": "control_volume", "wing": True, "shape": list(counts), **_plain(options)},
+        f"{counts[0]} x {counts[1]} x {counts[2]} control points along chord, span and height of "
+        "the wing's own box, each moving up and down",
+    )
+    span = float(np.ptp(made.rest[:, 1]))
+    draft.add("move_z", {"link": "each", "axis": "z"}, math.prod(counts), 0.01 * span, "m")
+    return draft
+
+
+def cage(maker: str) -> Callable[..., Draft]:
+    """A kind of cage; its vertices move along the axes of space."""
+
+    def drafted(geometry: Geometry, **options: Any) -> Draft:
+        if not isinstance(geometry, Surface):
+            raise GeometryError(f"a cage goes around a surface, got a {type(geometry).__name__}")
+        made = getattr(registry.deformer("cage"), maker)(geometry, **options)
+        count = len(made.rest)
+        draft = Draft(
+            {"deformer": "cage"},
+            f"{count} vertices and {len(made.shape.faces)} triangles around the geometry, each "
+            "vertex moving along x, y and z; its effect fades in a few edges",
+            beside={"_cage.obj": Surface(made.rest, made.shape.faces)},
+        )
+        edges = made.rest[made.lines[:, 0]] - made.rest[made.lines[:, 1]]
+        step = BOUND * float(np.median(np.linalg.norm(edges, axis=1)))
+        for axis in "xyz":
+            draft.add(f"move_{axis}", {"link": "each", "axis": axis}, count, step, "m")
+        return draft
+
+    return drafted
+
+
 def _section_lattice(shape: tuple[int, int, int]) -> Draft:
     draft = Draft(
         {"deformer": "lattice", "shape": list(shape), "margin": [0.02, 0.1, 0.0]},
@@ -203,9 +242,11 @@ def _rounded(number: float) -> float:
 
 KINDS: dict[str, Callable[..., Draft]] = {
     "lattice": lattice,
+    "wing-lattice": wing_lattice,
+    "cage": cage("around"),
+    "wing-cage": cage("around_wing"),
+    "body-cage": cage("around_body"),
     "wing-skeleton": posed("wing_skeleton"),
     "body-skeleton": posed("body_skeleton"),
 }
 """Kinds of parameterisation by the name that the command line calls them."""
-
-__all__ = ["KINDS", "METRES", "Draft", "parameterise"]

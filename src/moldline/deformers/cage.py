@@ -15,7 +15,9 @@ from typing_extensions import override
 from .._types import Array, Points, Vector, is_concrete
 from ..errors import GeometryError, ParameterError
 from ..mesh import Surface
+from ..mesh.enclosure import Denser, enclosure
 from ..mesh.io import read
+from ..mesh.rings import body_rings, wing_rings
 from ..numerics.harmonic import Harmonic
 from ..numerics.mean_value import MeanValue
 from ..numerics.winding import winding, winding_in_jax
@@ -107,6 +109,62 @@ class Cage(AbstractControlNet):
             return cls.of(surface, **options)
         except GeometryError as error:
             raise GeometryError(f"{path}: {error}") from None
+
+    @classmethod
+    def around(
+        cls,
+        surface: Surface,
+        faces: int = 200,
+        offset: float = 0.05,
+        *,
+        component: str | None = None,
+        denser: Sequence[Denser] = (),
+        **options: Any,
+    ) -> "Cage":
+        """An even cage of about `faces` triangles around a surface, or one component of it.
+
+        `offset` is its distance as a part of the diagonal of what it encloses; each of `denser`,
+        a place, a radius [m] and a factor, makes edges there as many times shorter.
+        """
+        made = enclosure(surface, faces, offset, component, denser)
+        return cls.of(made.surface, **options)
+
+    @classmethod
+    def around_wing(
+        cls,
+        surface: Surface,
+        stations: int | Sequence[float] = 5,
+        chordwise: int = 4,
+        offset: float = 0.1,
+        *,
+        component: str | None = None,
+        **options: Any,
+    ) -> "Cage":
+        """Rings around the sections of a half wing, numbered station by station.
+
+        Ring s has the points from 2 s chordwise on: the upper ones along the chord, then the lower
+        ones back. `offset` is its distance in chords and in section heights.
+        """
+        made = wing_rings(surface, stations, chordwise, offset, component)
+        return cls.of(made.surface, **options)
+
+    @classmethod
+    def around_body(
+        cls,
+        surface: Surface,
+        stations: int | Sequence[float] = 7,
+        around: int = 8,
+        offset: float = 0.1,
+        *,
+        component: str | None = None,
+        **options: Any,
+    ) -> "Cage":
+        """Rings of `around` points around the sections of a body along x, from the nose on.
+
+        Ring s has the points from s around on, the first above, then towards positive y.
+        """
+        made = body_rings(surface, stations, around, offset, component)
+        return cls.of(made.surface, **options)
 
     @classmethod
     @override

@@ -41,7 +41,7 @@ def embedded(cage: "Cage", points: np.ndarray, refuse: bool) -> AbstractEmbeddin
         return kept
     rows = np.random.default_rng(0).choice(len(points), min(TRIED, len(points)), replace=False)
     tried = _weights(cage, points, np.sort(rows), False)
-    sparse = np.mean(np.abs(tried) > NOTHING) < SPARSE
+    sparse = np.count_nonzero(np.abs(tried) > NOTHING) < SPARSE * tried.size
     parts = _parts(cage, points, refuse)
     if sparse:
         pieces = [scipy.sparse.csr_array(np.where(np.abs(w) > NOTHING, w, 0.0)) for _, w in parts]

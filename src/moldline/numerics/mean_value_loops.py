@@ -5,85 +5,127 @@ import numpy as np
 
 _compiled = numba.njit(nogil=True, cache=True, error_model="numpy")
 
-CLOSE = 1e-12
-"""A point this near to a vertex or a face, in sizes of the cage, lies on it."""
+CLOSE = 1e-14
+"""A point this near to a vertex, in sizes of the cage, lies on it."""
+
+STRAIGHT = 1e-13
+"""Sine below which two corners are seen in one direction, or in opposite ones."""
+
+FLAT = 1e-15
+"""Volume below which three directions lie in a plane."""
+
+SMALL = 1e-3
+"""Below it a series takes the place of arcsin(x) / x."""
+
+ON = 1
+"""What a face says when the point lies on it."""
 
 
 @_compiled
-def weights(points, corners, faces, size, out, part, start, stop):
-    """Weights of the corners at points, whatever side of the cage they are on."""
-    count = len(corners)
-    unit, length = np.empty((count, 3)), np.empty(count)
-    edge, angle, cosine, sine = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+def weights(points, corners, faces, sides, edges, size, out, part, start, stop):
+    """Weights of the corners at points, on whatever side of the cage they are.
+
+    `edges` are pairs of corners, and `sides` the edge opposite each corner of each face.
+    """
+    unit, length = np.empty((len(corners), 3)), np.empty(len(corners))
+    angle, sine = np.empty(len(edges)), np.empty(len(edges))
     for n in range(start, stop):
         own = out[n]
         own[:] = 0.0
-        at_corner, on_face = -1, -1
-        for j in range(count):
-            square = 0.0
-            for d in range(3):
-                unit[j, d] = corners[j, d] - points[n, d]
-                square += unit[j, d] ** 2
-            length[j] = np.sqrt(square)
-            if length[j] <= CLOSE * size:
-                at_corner = j
-                break
-            for d in range(3):
-                unit[j, d] /= length[j]
+        at_corner = _seen(points[n], corners, CLOSE * size, unit, length)
         if at_corner >= 0:
             own[at_corner] = 1.0
             continue
+        for e in range(len(edges)):
+            angle[e], sine[e] = _between(unit[edges[e, 0]], unit[edges[e, 1]])
         for t in range(len(faces)):
-            half = 0.0
-            for i in range(3):
-                p, q = faces[t, (i + 1) % 3], faces[t, (i + 2) % 3]
-                square = 0.0
-                for d in range(3):
-                    square += (unit[p, d] - unit[q, d]) ** 2
-                edge[i] = np.sqrt(square)
-                angle[i] = 2 * np.arcsin(min(1.0, edge[i] / 2))
-                half += angle[i] / 2
-            a, b, c = faces[t, 0], faces[t, 1], faces[t, 2]
-            volume = (
-                unit[a, 0] * (unit[b, 1] * unit[c, 2] - unit[b, 2] * unit[c, 1])
-                + unit[a, 1] * (unit[b, 2] * unit[c, 0] - unit[b, 0] * unit[c, 2])
-                + unit[a, 2] * (unit[b, 0] * unit[c, 1] - unit[b, 1] * unit[c, 0])
-            )
-            if np.pi - half < FLAT:
-                on_face = t
+            if _add(faces[t], sides[t], unit, length, angle, sine, own) == ON:
                 break
-            if abs(volume) < FLAT:
-                continue  # outside, in the plane of the face
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                cosine[i] = (
-                    2
-                    * np.sin(half)
-                    * np.sin(half - angle[i])
-                    / (np.sin(angle[j]) * np.sin(angle[k]))
-                    - 1
-                )
-                sine[i] = np.sqrt(max(0.0, 1 - cosine[i] ** 2)) * (1.0 if volume > 0 else -1.0)
-            if min(abs(sine[0]), abs(sine[1]), abs(sine[2])) < FLAT:
-                continue
-            for i in range(3):
-                j, k = (i + 1) % 3, (i + 2) % 3
-                own[faces[t, i]] += (angle[i] - cosine[j] * angle[k] - cosine[k] * angle[j]) / (
-                    length[faces[t, i]] * np.sin(angle[j]) * sine[k]
-                )
-        if on_face >= 0:
-            own[:] = 0.0
-            for i in range(3):
-                j, k = faces[on_face, (i + 1) % 3], faces[on_face, (i + 2) % 3]
-                square = 0.0
-                for d in range(3):
-                    square += (unit[j, d] - unit[k, d]) ** 2
-                turn = 2 * np.arcsin(min(1.0, np.sqrt(square) / 2))
-                own[faces[on_face, i]] = np.sin(turn) * length[j] * length[k]
         total = own.sum()
-        for j in range(count):
+        for j in range(len(corners)):
             own[j] /= total
 
 
-FLAT = 1e-9
-"""A solid angle this near to half the sphere, or to none, is a flat one."""
+@_compiled
+def _seen(place, corners, close, unit, length):
+    """Directions and distances of the corners; the number of one that is too close, else -1."""
+    for j in range(len(corners)):
+        x, y, z = corners[j, 0] - place[0], corners[j, 1] - place[1], corners[j, 2] - place[2]
+        length[j] = np.sqrt(x * x + y * y + z * z)
+        if length[j] <= close:
+            return j
+        unit[j, 0], unit[j, 1], unit[j, 2] = x / length[j], y / length[j], z / length[j]
+    return -1
+
+
+@_compiled
+def _between(u, v):
+    """The angle between unit vectors, exact near 0 and pi too, and its sine."""
+    apart, along = 0.0, 0.0
+    for d in range(3):
+        apart += (u[d] - v[d]) ** 2
+        along += (u[d] + v[d]) ** 2
+    apart, along = np.sqrt(apart), np.sqrt(along)
+    return 2 * np.arctan2(apart, along), 2 * apart * along / (apart * apart + along * along)
+
+
+@_compiled
+def _add(face, side, unit, length, angle, sine, own):
+    """Add a face's weights; where the point lies on it, put those instead of all others.
+
+    The sides a, b, c of the spherical triangle have the half sum s, and its corners span the volume
+    2 sqrt(sin s sin(s-a) sin(s-b) sin(s-c)). Near a face's plane, outside the face, sin(s-a) of the
+    longest side is lost to rounding, but the volume is not: there the one follows from the other.
+    """
+    i = 0
+    for k in range(1, 3):
+        if angle[side[k]] > angle[side[i]]:
+            i = k
+    j, k = (i + 1) % 3, (i + 2) % 3
+    a, b, c = angle[side[i]], angle[side[j]], angle[side[k]]
+    sin_a, sin_b, sin_c = sine[side[i]], sine[side[j]], sine[side[k]]
+    if a > 2 and sin_a < STRAIGHT:  # on the edge
+        own[:] = 0.0
+        own[face[j]], own[face[k]] = 1 / length[face[j]], 1 / length[face[k]]
+        return ON
+    if min(sin_a, sin_b, sin_c) < STRAIGHT:
+        return 0  # on an edge's line, beyond it
+    volume = _spanned(unit[face[i]], unit[face[j]], unit[face[k]])
+    half = (a + b + c) / 2
+    whole, less_a = np.sin(half), np.sin(half - a)
+    less_b, less_c = np.sin(half - b), np.sin(half - c)
+    if whole < less_a:
+        if abs(volume) < FLAT:
+            own[:] = 0.0
+            volume = 1.0
+            is_on = ON
+        else:
+            is_on = 0
+        over_a = 2 * whole * less_a / (sin_b * sin_c) - 1
+        over_b = 2 * whole * less_b / (sin_a * sin_c) - 1
+        over_c = 2 * whole * less_c / (sin_a * sin_b) - 1
+        at_a = a - b * over_c - c * over_b
+        at_b = b - a * over_c - c * over_a
+        at_c = c - a * over_b - b * over_a
+        scale = 1 / (2 * volume)
+    else:
+        is_on = 0
+        scale = volume / (4 * whole * less_b * less_c)
+        x = scale * volume
+        ratio = np.arcsin(x) / x if x > SMALL else 1 + x * x * (1 / 6 + x * x * 3 / 40)
+        at_a = b * less_b / (sin_a * sin_b) + c * less_c / (sin_a * sin_c) - ratio
+        at_b = a * less_b / (sin_a * sin_b) - c * whole / (sin_b * sin_c) + ratio
+        at_c = a * less_c / (sin_a * sin_c) - b * whole / (sin_b * sin_c) + ratio
+    own[face[i]] += scale * at_a * sin_a / length[face[i]]
+    own[face[j]] += scale * at_b * sin_b / length[face[j]]
+    own[face[k]] += scale * at_c * sin_c / length[face[k]]
+    return is_on
+
+
+@_compiled
+def _spanned(u, v, w):
+    return (
+        u[0] * (v[1] * w[2] - v[2] * w[1])
+        + u[1] * (v[2] * w[0] - v[0] * w[2])
+        + u[2] * (v[0] * w[1] - v[1] * w[0])
+    )

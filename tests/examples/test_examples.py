@@ -13,6 +13,8 @@ EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 EXPECTED = {
     "ex01_transport_wing": {"motion": 99.37893082820044, "gradient": 4389.475353791933},
     "ex02_slender_fuselage": {"slenderness": 20.883722662938638, "gradient": 22755.626145026796},
+    "ex03_capsule_cage": {"length": 3.8218356809711915, "motion": 26.44588822793117},
+    "ex04_forward_sweep": {"motion": 729.4730613449883, "gradient": 4398.179580543739},
 }
 
 
@@ -20,6 +22,8 @@ EXPECTED = {
 def test_an_example_gives_its_numbers(path):
     numbers = runpy.run_path(str(path))["main"]()
     order = numbers.pop("order", 2.0)
+    assert numbers.pop("miss", 0.0) < 1e-9  # of what a skeleton was asked for [deg]
+    assert numbers.pop("decay", 0.0) < 0.05  # of a cage vertex's effect with distance
     assert numbers == pytest.approx(EXPECTED[path.stem], rel=1e-6)
     assert order == pytest.approx(2.0, abs=0.05)  # the estimate of an order is rough
 

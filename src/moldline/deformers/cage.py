@@ -54,6 +54,8 @@ class Cage(AbstractControlNet):
         convex.
     cells
         Harmonic: of the grid over the cage's extent, one count or three; by the cage if None.
+    shift
+        Harmonic: where the grid lies, 0 to 3; the first that does if None.
     store
         Folder that keeps the weights of points, so that they are found once; None keeps none.
     frozen
@@ -70,6 +72,7 @@ class Cage(AbstractControlNet):
     shape: Shape = eqx.field(static=True)
     coordinates: str = eqx.field(static=True)
     cells: tuple[int, ...] | None = eqx.field(static=True)
+    shift: int | None = eqx.field(static=True)
     store: Path | None = eqx.field(static=True)
     frozen: np.ndarray
 
@@ -80,6 +83,7 @@ class Cage(AbstractControlNet):
         *,
         coordinates: str = "harmonic",
         cells: int | Sequence[int] | None = None,
+        shift: int | None = None,
         freeze: Sequence[int] = (),
         store: Path | str | None = None,
     ):
@@ -90,6 +94,7 @@ class Cage(AbstractControlNet):
         self.shape = shaped(points, faces)
         self.coordinates = coordinates
         self.cells = None if cells is None else tuple(np.atleast_1d(cells).tolist())
+        self.shift = shift
         self.store = None if store is None else Path(store)
         self.frozen = np.zeros(len(self.shape.points), bool)
         self.frozen[self.numbers([[n] for n in freeze]) if len(freeze) else []] = True
@@ -220,7 +225,7 @@ class Cage(AbstractControlNet):
         if self.coordinates == "mean value":
             return MeanValue(self.shape.points, self.shape.faces)
         cells = self.cells if self.cells is None or len(self.cells) > 1 else self.cells[0]
-        return Harmonic(self.shape.points, self.shape.faces, cells, progress=True)
+        return Harmonic(self.shape.points, self.shape.faces, cells, True, self.shift)
 
     @override
     def samples(self, most: int) -> Points:
@@ -279,14 +284,18 @@ class Cage(AbstractControlNet):
     def refined(self) -> tuple["Cage", Transfer]:
         """A cage of more points, and the matrix that takes controls of this one to its.
 
-        Each triangle is cut in four, so the cage stays where it is; with the same cells the
-        harmonic coordinates give the same shape to rounding.
+        Each triangle is cut in four, so the cage stays where it is, and on the same grid harmonic
+        coordinates give the same shape to rounding. It takes a cage whose grid passes through no
+        middle of an edge; an error says so when points are bound.
         """
         points, faces, weights = subdivided(self.rest, self.shape.faces)
-        cells = self.solved.report.cells if isinstance(self.solved, Harmonic) else None
+        cells, shift = None, None
+        if isinstance(self.solved, Harmonic):
+            cells, shift = self.solved.report.cells, self.solved.report.shift
         transfer, frozen = kept(weights, self.frozen)
         fine = Cage(
-            points, faces, coordinates=self.coordinates, cells=cells, store=self.store,
+            points, faces, coordinates=self.coordinates, cells=cells, shift=shift,
+            store=self.store,
             freeze=np.flatnonzero(frozen).tolist(),
         )  # fmt: skip
         return fine, transfer

@@ -14,7 +14,7 @@ from ..mesh.io.files import replacing
 from ..numerics.harmonic import Harmonic
 from ..numerics.nearest import nearest
 from ..numerics.winding import winding
-from .cage_shape import check_inside
+from .cage_shape import check_finite, check_inside
 from .embedding import AbstractEmbedding
 from .table import NOTHING, SPARSE, DenseTable, SparseTable, blocked, put
 
@@ -36,6 +36,8 @@ FORMAT = 1
 
 def embedded(cage: "Cage", points: np.ndarray, refuse: bool) -> AbstractEmbedding:
     """Points with their weights; those outside a harmonic cage are refused, or get none."""
+    if refuse:
+        check_finite(points)
     kept = _kept(cage, points) if refuse else None
     if kept is not None:
         return kept
@@ -84,7 +86,7 @@ def _weights(cage: "Cage", points: np.ndarray, rows: np.ndarray, refuse: bool) -
 
 def _place(cage: "Cage", points: np.ndarray) -> Path:
     """The file that keeps the weights, named by all that they depend on."""
-    digest = hashlib.sha256(f"{FORMAT} {cage.coordinates} {cage.cells}".encode())
+    digest = hashlib.sha256(f"{FORMAT} {cage.coordinates} {cage.cells} {cage.shift}".encode())
     for array in (cage.rest, cage.shape.faces, points):
         digest.update(str(array.shape).encode())
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -97,7 +99,7 @@ def _kept(cage: "Cage", points: np.ndarray) -> AbstractEmbedding | None:
     if cage.store is None:
         return None
     try:
-        with np.load(_place(cage, points), allow_pickle=False) as found:
+        with _place(cage, points).open("rb") as file, np.load(file) as found:
             if "blocks" in found:
                 return DenseTable(points, found["blocks"])
             entries = found["data"], found["indices"], found["indptr"]

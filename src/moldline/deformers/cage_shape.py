@@ -11,8 +11,9 @@ from .._types import Array
 from ..errors import GeometryError
 from ..mesh import Surface, topology
 from ..mesh.intersections import self_intersections
-from ..mesh.parts import inside_out_pieces
 from ..mesh.planar import triangulated
+from ..mesh.quality import signed_volume
+from ..numerics.winding import winding
 
 NAMED = 3
 """Places that an error names."""
@@ -43,10 +44,11 @@ def shaped(points: Any, faces: Sequence[Sequence[int]] | Array) -> Shape:
         raise GeometryError("a cage's points must be finite, of shape (m, 3)")
     if len(points) > MOST:
         raise GeometryError(f"a cage has {MOST} points at most, got {len(points)}; make it coarser")
-    loops = [np.asarray(face, int) for face in faces]
+    loops = [np.asarray(face) for face in faces]
     for number, loop in enumerate(loops):
         if (
-            len(set(loop.tolist())) < max(3, len(loop))
+            loop.dtype.kind not in "iu"
+            or len(set(loop.tolist())) < max(3, len(loop))
             or loop.min() < 0
             or loop.max() >= len(points)
         ):
@@ -95,8 +97,9 @@ def _check_closed(points: np.ndarray, faces: np.ndarray) -> None:
     ):
         if len(found):
             raise GeometryError(
-                f"the cage {kind} at {len(found)} edges, near {_places(points[found[:, 0]])}; a "
-                "cage is a closed surface (moldline check --fix may mend it)"
+                f"the cage {kind} at {len(found)} edges, near "
+                f"{_places(points[found].mean(axis=1))}; a cage is a closed surface "
+                "(moldline check --fix may mend it)"
             )
     crossing = self_intersections(points, faces)
     if len(crossing.pairs):
@@ -107,15 +110,34 @@ def _check_closed(points: np.ndarray, faces: np.ndarray) -> None:
 
 
 def _outwards(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Faces with every piece looking outwards; a piece within another encloses a hole."""
-    wrong = inside_out_pieces(Surface(points, faces))
-    _, piece = topology.pieces(faces)
-    return np.where(np.isin(piece, wrong)[:, None], faces[:, ::-1], faces)
+    """Faces of every piece turned outwards, or inwards where it lies in another: a hole."""
+    count, piece = topology.pieces(faces)
+    turned = faces.copy()
+    for number in range(count):
+        own = faces[piece == number]
+        around = sum(
+            abs(winding(points[own[:1, 0]], points, faces[piece == other])[0]) > 0.5
+            for other in range(count)
+            if other != number
+        )
+        if (signed_volume(Surface(points, own)) < 0) != (around % 2 == 1):
+            turned[piece == number] = own[:, ::-1]
+    return turned
 
 
 def _places(places: np.ndarray) -> str:
     shown = [f"({', '.join(f'{x:.6g}' for x in place)})" for place in places[:NAMED]]
     return "; ".join(shown) + (" ..." if len(places) > NAMED else "")
+
+
+def check_finite(points: np.ndarray) -> None:
+    """Refuse points that are nowhere."""
+    lost = np.flatnonzero(~np.isfinite(points).all(axis=1))
+    if len(lost):
+        raise GeometryError(
+            f"{len(lost)} of {len(points)} points have coordinates that are not finite (first: "
+            f"point {lost[0]}); leave them out"
+        )
 
 
 def check_inside(

@@ -15,7 +15,7 @@ from .embedding import AbstractEmbedding, Displacement, Gathering, Motion
 NOTHING = 1e-17
 """A weight below this is less than the rounding of the others."""
 
-SPARSE = 0.25
+SPARSE = 0.35
 """Share of weights above nothing up to which a sparse table is the faster one."""
 
 THREAD_WORTH = 512

@@ -53,7 +53,10 @@ class Cut(NamedTuple):
 
 
 class Grid(NamedTuple):
-    """A grid around a cage with `corners`; `number` counts the inside nodes, -1 elsewhere."""
+    """A grid around a cage with `corners`; `number` counts the inside nodes, -1 elsewhere.
+
+    `shift` is the number of that among `SHIFTS` which it took.
+    """
 
     origin: np.ndarray
     spacing: np.ndarray
@@ -61,6 +64,7 @@ class Grid(NamedTuple):
     faces: np.ndarray
     cuts: tuple[Cut, Cut, Cut]
     number: Int[np.ndarray, "nx ny nz"]
+    shift: int
 
     @property
     def size(self) -> int:
@@ -74,9 +78,15 @@ class Grid(NamedTuple):
 
 
 def fitted(
-    points: Float[np.ndarray, "m 3"], faces: Int[np.ndarray, "t 3"], cells: Sequence[int]
+    points: Float[np.ndarray, "m 3"],
+    faces: Int[np.ndarray, "t 3"],
+    cells: Sequence[int],
+    shift: int | None = None,
 ) -> Grid:
-    """The grid with so many cells over the cage's extent along each axis."""
+    """The grid with so many cells over the cage's extent along each axis.
+
+    It takes the first of the shifts with which all lines agree, or only that of the given number.
+    """
     low, extent = points.min(axis=0), np.ptp(points, axis=0)
     shape = np.asarray(cells, np.int64) + 2 * PAD + 1
     if np.prod(shape.astype(float)) > MOST_NODES:
@@ -85,14 +95,19 @@ def fitted(
             "nodes; give fewer cells"
         )
     spacing = extent / np.asarray(cells)
-    for shift in SHIFTS:
-        origin = low - (PAD - 1 + np.array(shift)) * spacing
+    for number in range(len(SHIFTS)) if shift is None else [shift]:
+        origin = low - (PAD - 1 + np.array(SHIFTS[number])) * spacing
         corners = np.ascontiguousarray((points - origin) / spacing)
         cuts = tuple(_cut(corners, faces, axis, shape) for axis in range(3))
         inside = _inside(cuts, shape)
         if inside is not None:
             index = np.where(inside, np.cumsum(inside).reshape(shape) - 1, -1).astype(np.int32)
-            return Grid(origin, spacing, corners, faces, cuts, index)  # type: ignore[arg-type]
+            return Grid(origin, spacing, corners, faces, cuts, index, number)  # type: ignore[arg-type]
+    if shift is not None:
+        raise GeometryError(
+            f"lines of the grid of {' x '.join(map(str, cells))} cells pass through corners of the "
+            "cage; give one cell more or less"
+        )
     raise GeometryError(
         f"lines along x, y and z through the cage of {len(points)} points and {len(faces)} "
         "triangles disagree on what is inside; a cage must be closed and must not cross itself"

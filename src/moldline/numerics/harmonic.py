@@ -38,7 +38,7 @@ class Report(NamedTuple):
 
     `cells` are those over the cage's extent, `unknowns` the nodes inside, `cycles` those of the
     multigrid method and `change` the largest of a weight in the last one; `precision` is by how
-    much the weights at the nodes miss them, in extents of the cage.
+    much the weights at the nodes miss them, in extents of the cage; `shift` is where the grid lies.
     """
 
     cells: tuple[int, int, int]
@@ -46,14 +46,16 @@ class Report(NamedTuple):
     cycles: int
     change: float
     precision: float
+    shift: int
 
 
 class Harmonic:
     """Harmonic coordinates inside a cage of triangles, closed and not crossing itself.
 
     The cage may have several components, or holes inside. `cells` are those of the grid over its
-    extent, for all axes or each; by default a cage's thin places get six across. Weights then
-    err by the square of the cells' size, and most near edges of the cage.
+    extent, for all axes or each; by default thin places get six across. Weights then err by the
+    square of the cells' size, and most near edges of the cage. `shift` puts the grid where another
+    one's report says it was.
 
     Attributes
     ----------
@@ -67,6 +69,7 @@ class Harmonic:
         faces: Int[np.ndarray, "t 3"],
         cells: int | Sequence[int] | None = None,
         progress: bool = False,
+        shift: int | None = None,
     ):
         points, faces = np.asarray(points, float), np.ascontiguousarray(faces, np.int64)
         if not np.all(np.ptp(points, axis=0) > 0):
@@ -74,7 +77,7 @@ class Harmonic:
                 f"the cage must extend along x, y and z, its points cover {np.ptp(points, axis=0)}"
             )
         counts = cage_grid.suitable(points, faces) if cells is None else _counted(cells)
-        grid = cage_grid.fitted(points, faces, counts)
+        grid = cage_grid.fitted(points, faces, counts, shift)
         if grid.size == 0:
             raise GeometryError(
                 f"no node of a grid of {_product(counts)} cells lies inside the cage; give more"
@@ -88,7 +91,8 @@ class Harmonic:
         links, hits = cage_grid.linked(grid)
         solved = multigrid.solved(links, hits, len(points), progress)
         missed = np.abs(solved.values @ grid.corners - grid.nodes) / counts
-        self.report = Report(counts, grid.size, solved.cycles, solved.change, float(missed.max()))
+        change, precision = solved.change, float(missed.max())
+        self.report = Report(counts, grid.size, solved.cycles, change, precision, grid.shift)
         if not self.report.precision < PROOF:
             raise GeometryError(
                 f"weights of a node miss it by {self.report.precision:.1e} of the cage's extent "

@@ -17,9 +17,6 @@ FLAT = 1e-15
 SMALL = 1e-3
 """Below it a series takes the place of arcsin(x) / x."""
 
-ON = 1
-"""What a face says when the point lies on it."""
-
 
 @_compiled
 def weights(points, corners, faces, sides, edges, size, out, part, start, stop):
@@ -39,7 +36,7 @@ def weights(points, corners, faces, sides, edges, size, out, part, start, stop):
         for e in range(len(edges)):
             angle[e], sine[e] = _between(unit[edges[e, 0]], unit[edges[e, 1]])
         for t in range(len(faces)):
-            if _add(faces[t], sides[t], unit, length, angle, sine, own) == ON:
+            if _add(faces[t], sides[t], unit, length, angle, sine, own):
                 break
         total = own.sum()
         for j in range(len(corners)):
@@ -71,7 +68,7 @@ def _between(u, v):
 
 @_compiled
 def _add(face, side, unit, length, angle, sine, own):
-    """Add a face's weights; where the point lies on it, put those instead of all others.
+    """Add a face's weights; whether the point lies on it, which leaves no others.
 
     The sides a, b, c of the spherical triangle have the half sum s, and its corners span the volume
     2 sqrt(sin s sin(s-a) sin(s-b) sin(s-c)). Near a face's plane, outside the face, sin(s-a) of the
@@ -87,20 +84,17 @@ def _add(face, side, unit, length, angle, sine, own):
     if a > 2 and sin_a < STRAIGHT:  # on the edge
         own[:] = 0.0
         own[face[j]], own[face[k]] = 1 / length[face[j]], 1 / length[face[k]]
-        return ON
+        return True
     if min(sin_a, sin_b, sin_c) < STRAIGHT:
-        return 0  # on an edge's line, beyond it
+        return False  # on an edge's line, beyond it
     volume = _spanned(unit[face[i]], unit[face[j]], unit[face[k]])
     half = (a + b + c) / 2
     whole, less_a = np.sin(half), np.sin(half - a)
     less_b, less_c = np.sin(half - b), np.sin(half - c)
+    is_on = whole < less_a and abs(volume) < FLAT
+    if is_on:
+        own[:], volume = 0.0, 1.0
     if whole < less_a:
-        if abs(volume) < FLAT:
-            own[:] = 0.0
-            volume = 1.0
-            is_on = ON
-        else:
-            is_on = 0
         over_a = 2 * whole * less_a / (sin_b * sin_c) - 1
         over_b = 2 * whole * less_b / (sin_a * sin_c) - 1
         over_c = 2 * whole * less_c / (sin_a * sin_b) - 1
@@ -109,10 +103,9 @@ def _add(face, side, unit, length, angle, sine, own):
         at_c = c - a * over_b - b * over_a
         scale = 1 / (2 * volume)
     else:
-        is_on = 0
         scale = volume / (4 * whole * less_b * less_c)
-        x = scale * volume
-        ratio = np.arcsin(x) / x if x > SMALL else 1 + x * x * (1 / 6 + x * x * 3 / 40)
+        x = scale * volume  # sin(s-a)
+        ratio = np.arcsin(x) / x if x > SMALL else 1 + x * x * (1 / 6 + x * x * (3 / 40))
         at_a = b * less_b / (sin_a * sin_b) + c * less_c / (sin_a * sin_c) - ratio
         at_b = a * less_b / (sin_a * sin_b) - c * whole / (sin_b * sin_c) + ratio
         at_c = a * less_c / (sin_a * sin_c) - b * whole / (sin_b * sin_c) + ratio
@@ -124,6 +117,7 @@ def _add(face, side, unit, length, angle, sine, own):
 
 @_compiled
 def _spanned(u, v, w):
+    """Volume of the parallelepiped of three vectors."""
     return (
         u[0] * (v[1] * w[2] - v[2] * w[1])
         + u[1] * (v[2] * w[0] - v[0] * w[2])

@@ -4,9 +4,10 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from .._types import Vector
+from .._types import Array, Vector
 from ..deformers.net import AbstractControlNet
 from ..deformers.posed import AbstractPosed
 from ..errors import ParameterError
@@ -136,7 +137,7 @@ def _nets(pipeline: Pipeline) -> list[tuple[Stage, AbstractControlNet]]:
     return found
 
 
-def _net_controls(stage: Stage, controls: Vector) -> Vector:
+def _net_controls(stage: Stage, controls: Vector) -> Float[Array, "n"]:
     if isinstance(stage.deformer, AbstractPosed):
         return stage.deformer.pose(controls)
     return controls

@@ -24,7 +24,7 @@ def main() -> dict[str, float]:
     off_axis = np.linalg.norm(cage.rest[nose, 1:], axis=1)
     blunter = 0.5 * np.minimum((off_axis / off_axis.max()) ** 2, 1.0) - 0.55
     variable = ml.variable("nose", value=blunter.tolist(), bounds=(-1, 1), unit="m")
-    link = ml.links.each(cage, "x", index=nose[:, None])
+    link = ml.links.each(cage, "x", index=nose[:, None].tolist())
     case = ml.Pipeline(body, [ml.Stage(cage, {variable: link})])
     pointed = case()
 

@@ -48,9 +48,7 @@ def main() -> dict[str, float]:
     top = np.asarray(body.points)[size.argmax()]
     far = np.linalg.norm(np.asarray(body.points) - top, axis=1) > 1.5
     print(f"cage of {len(cage.rest)} vertices, {len(nose)} of them at the nose")
-    print(
-        f"sensitivity to one vertex  {size.max():.3f} next to it, {size[far].max():.4f} afar"
-    )
+    print(f"sensitivity to one vertex  {size.max():.3f} next to it, {size[far].max():.4f} afar")
     print("wrote " + ", ".join(f"{OUT.name}/{name}" for name in ("capsule.tri", *pictures)))
     motion = np.asarray(pointed.points) - np.asarray(body.points)
     return {

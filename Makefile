@@ -40,9 +40,10 @@ check: .venv/ready-dev  ## format, lint, types, layers, tests
 slow: .venv/ready  ## everything at full size
 	@$(BIN)/python -m pytest
 
-bench: .venv/ready  ## the benchmark tables: deformation, embedding, files
+bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, files
 	@$(BIN)/python benchmarks/deform.py
 	@$(BIN)/python benchmarks/embedding.py
+	@$(BIN)/python benchmarks/cage.py
 	@$(BIN)/python benchmarks/files.py
 
 docs: .venv/ready-dev  ## the documentation, into site/

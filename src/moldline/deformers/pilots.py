@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -75,10 +76,12 @@ class Pilots(AbstractPosed):
         Independent combinations of the conditions in these scales.
     response
         Where all is linear: hidden controls for each condition.
+    solver
+        From changes of the pilots to hidden controls, on the shape at rest.
 
     Notes
     -----
-    Source: AIAA 2012-0965, equations 1 to 7; docs/theory/pilots.md derives the derivatives.
+    Source: AIAA 2012-0965, equations 1 to 7.
     """
 
     net: AbstractDeformer
@@ -90,6 +93,7 @@ class Pilots(AbstractPosed):
     scales: Float[np.ndarray, "c"]
     combinations: Float[np.ndarray, "r c"]
     response: Float[np.ndarray, "n c"] | None
+    solver: Callable[[Vector], Array] = eqx.field(static=True)
 
     def __init__(
         self,
@@ -112,6 +116,8 @@ class Pilots(AbstractPosed):
         self.combinations = independent(slopes / self.scales[:, None], self.weights)
         linear = isinstance(hidden, AbstractControlNet) and all(m.is_affine for m in self.measures)
         self.response = _response(slopes / self.scales[:, None], self.weights) if linear else None
+        bound = self._bound()
+        self.solver = jax.jit(lambda controls: self._solved(bound, controls).x)
 
     @property
     def measures(self) -> list[AbstractMeasure]:
@@ -138,7 +144,7 @@ class Pilots(AbstractPosed):
     def pose(self, controls: Vector) -> Float[Array, "n"]:
         if self.response is not None:
             return self.response @ (self._change(controls) / self.scales)
-        return self._solved(self._bound(), controls).x
+        return self.solver(jnp.asarray(controls))
 
     @override
     def settle(

@@ -77,8 +77,10 @@ def parameterise(
     try:
         draft = KINDS[kind](geometry, **{k: v for k, v in options.items() if v is not None})
     except TypeError as error:
-        wrong = re.search(r"argument '(\w+)'", str(error))
-        raise ParameterError(f"{kind} takes no {wrong[1] if wrong else error}") from None
+        wrong = re.search(r"unexpected keyword argument '(\w+)'", str(error))
+        if wrong is None:
+            raise
+        raise ParameterError(f"{kind} takes no {wrong[1]}") from None
     for ending, surface in draft.beside.items():
         beside = target.with_name(f"{target.stem}{ending}")
         write(beside, surface, units=units)

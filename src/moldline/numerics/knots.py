@@ -13,7 +13,7 @@ from .bspline import Axis
 Knots = Float[np.ndarray, "k"]
 
 
-def cut(interior: Knots, parts: int) -> Knots:
+def cut(interior: Knots, parts: int) -> Float[np.ndarray, "cut"]:
     """With knots inserted that cut each cell of (0, 1) into even parts."""
     breaks = np.unique([0.0, *interior, 1.0])
     share = np.arange(1, parts) / parts
@@ -21,7 +21,7 @@ def cut(interior: Knots, parts: int) -> Knots:
     return np.sort(np.concatenate([interior, new.ravel()]))
 
 
-def filled(interior: Knots, count: int) -> Knots:
+def filled(interior: Knots, count: int) -> Float[np.ndarray, "filled"]:
     """With knots inserted until there are `count`, each in the middle of the longest cell.
 
     Of equally long cells it is the one nearest to the middle, then the first.
@@ -37,7 +37,7 @@ def filled(interior: Knots, count: int) -> Knots:
     return found
 
 
-def raised(interior: Knots, times: int) -> Knots:
+def raised(interior: Knots, times: int) -> Float[np.ndarray, "raised"]:
     """With each knot as often again as the degree is raised, so that no smoothness is asked for."""
     return np.sort(np.concatenate([interior, np.repeat(np.unique(interior), times)]))
 

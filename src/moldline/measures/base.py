@@ -1,6 +1,9 @@
 """What every measure is: numbers of a shape, differentiable by its points."""
 
 import abc
+import inspect
+from dataclasses import dataclass
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -8,6 +11,7 @@ import numpy as np
 from jaxtyping import Int
 
 from .._types import Points, Vector
+from ..errors import ParameterError
 
 
 class AbstractMeasure(eqx.Module):
@@ -33,9 +37,67 @@ class AbstractMeasure(eqx.Module):
     def of(self, places: Points) -> Vector:
         """The numbers, from the places of the points that it reads; plain JAX."""
 
+    def under(self, places: Points, controls: Vector) -> Vector:
+        """The same, for a measure that reads the controls of the deformer too; few do."""
+        return self.of(places)
+
     def __call__(self, points: Points) -> Vector:
         """The numbers of a shape, from all its points."""
         return self.of(jnp.asarray(points)[self.reads])
+
+    @classmethod
+    @abc.abstractmethod
+    def build(cls, geometry: Any, **options: Any) -> "AbstractMeasure":
+        """Make one from a case file's options, for a geometry."""
+
+    @classmethod
+    def options(cls) -> dict[str, inspect.Parameter]:
+        """What `build` accepts, by name."""
+        own = inspect.signature(cls.build, eval_str=True).parameters
+        return {k: p for k, p in own.items() if k != "geometry"}
+
+
+@dataclass(frozen=True, eq=False)
+class Constraint:
+    """A measure with bounds.
+
+    Attributes
+    ----------
+    measure
+        What is bounded.
+    lower, upper
+        Bounds of each of its numbers, or one for all, in its own unit; none by default. Where
+        both are equal the number is prescribed.
+    weight
+        What a miss counts where conditions contradict each other and are met in least squares.
+    """
+
+    measure: AbstractMeasure
+    lower: Any = -np.inf
+    upper: Any = np.inf
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        try:
+            low, high = self.bounds
+        except ValueError:
+            raise ParameterError(
+                f"a measure of {self.measure.size} numbers takes one bound or as many, got "
+                f"{self.lower} and {self.upper}"
+            ) from None
+        if np.isnan(low).any() or np.isnan(high).any() or np.any(low > high):
+            raise ParameterError(f"bounds {self.lower} and {self.upper} leave no choice")
+        if not 0 < self.weight < np.inf:
+            raise ParameterError(f"a weight is above zero, got {self.weight}")
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bound of each number."""
+        low, high = (
+            np.broadcast_to(np.asarray(bound, float), self.measure.size).copy()
+            for bound in (self.lower, self.upper)
+        )
+        return low, high
 
 
 def as_rows(numbers: Int[np.ndarray, "..."]) -> tuple[np.ndarray, np.ndarray]:

@@ -170,7 +170,7 @@ def _coarse(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | No
     corners = _owners(graph, seeds)[faces]
     joined = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
     cage = Surface(points[seeds], joined)
-    is_whole = is_closed(joined) and len(np.unique(joined)) == count
+    is_whole = np.all(edges(joined).uses == 2) and len(np.unique(joined)) == count
     return cage if is_whole and not len(nonmanifold_vertices(joined)) else None
 
 
@@ -208,7 +208,8 @@ def _normals(points: np.ndarray, faces: np.ndarray) -> np.ndarray:
     total = np.zeros_like(points)
     for corner in faces.T:
         np.add.at(total, corner, np.cross(b - a, c - a))
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return total / np.where(length > 0, length, 1.0)  # none where its faces fold onto each other
 
 
 def _depth(

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from ..errors import GeometryError, ParameterError
 from .enclosure import clear_of, part_of
 from .planform import planform
-from .slices import section
+from .slices import NEAR, section
 from .surface import Surface
 
 TRIES = 12
@@ -56,10 +56,13 @@ def wing_rings(
         raise ParameterError(f"a ring has two points or more along the chord, got {chordwise}")
     found = planform(surface, stations, component)
     y, chord = found.stations, found.chord
-    if y[-1] * y[0] < 0 or np.ptp(np.sign(np.asarray(surface.points)[:, 1])) > 1:
-        raise GeometryError("rings go around a half wing; give one side of it, or a component")
     points, triangles = part_of(surface, component)
     low, high = points[:, 1].min(), points[:, 1].max()
+    if min(high, -low) > NEAR * max(high, -low):
+        raise GeometryError(
+            f"rings go around a half wing, and this one reaches from y = {low:.6g} to {high:.6g}; "
+            "give one side of it, or a component"
+        )
     outward = np.sign(y[-1] - y[0])
     root, tip = (low, high) if outward > 0 else (high, low)
     height = np.maximum(found.high - found.low, 0.02 * chord)

@@ -7,9 +7,9 @@ import moldline as ml
 
 PUBLIC = {
     "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "BodySkeleton", "Bone", "Bones",
-    "Cage", "Cloud", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Lattice",
-    "LinearBinding", "Link", "Pipeline", "Planform", "Section", "Skeleton", "Stage", "Surface",
-    "Variable", "VolumeMesh", "WingSkeleton", "planform", "errors", "links", "load", "plot", "read",
+    "Cage", "Cloud", "Constraint", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Lattice",
+    "LinearBinding", "Link", "Pipeline", "Planform", "Section", "Skeleton", "Spot", "Stage", "Surface",
+    "Variable", "VolumeMesh", "WingSkeleton", "planform", "errors", "links", "load", "measures", "plot", "read",
     "read_sensitivities", "variable", "write", "write_sensitivities",
 }  # fmt: skip
 

@@ -14,7 +14,7 @@ else:
     os.environ["JAX_ENABLE_X64"] = "1"  # JAX reads it when it is imported
 
 if TYPE_CHECKING:
-    from . import errors, plot
+    from . import errors, measures, plot
     from .case import load
     from .deformers.base import AbstractBinding, AbstractDeformer, LinearBinding
     from .deformers.body_skeleton import BodySkeleton
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from .deformers.lattice import Lattice
     from .deformers.skeleton import Skeleton
     from .deformers.wing_skeleton import WingSkeleton
+    from .measures.base import Constraint
+    from .measures.spot import Spot
     from .mesh import Cloud, Geometry, Grid, Section, Surface, VolumeMesh
     from .mesh.io import read, write
     from .mesh.io.sensitivities import read_sensitivities, write_sensitivities
@@ -46,6 +48,7 @@ _HOMES = {
     "Bones": "deformers.bones",
     "Cage": "deformers.cage",
     "Cloud": "mesh",
+    "Constraint": "measures.base",
     "ControlVolume": "deformers.control_volume",
     "DirectSkeleton": "deformers.direct_skeleton",
     "Geometry": "mesh",
@@ -58,6 +61,7 @@ _HOMES = {
     "Pipeline": "pipeline.pipeline",
     "Section": "mesh",
     "Skeleton": "deformers.skeleton",
+    "Spot": "measures.spot",
     "Stage": "pipeline.stage",
     "Surface": "mesh",
     "Variable": "parameters.variable",
@@ -66,6 +70,7 @@ _HOMES = {
     "errors": "",
     "links": "parameters",
     "load": "case",
+    "measures": "",
     "planform": "mesh.planform",
     "plot": "",
     "read": "mesh.io",
@@ -75,7 +80,7 @@ _HOMES = {
     "write_sensitivities": "mesh.io.sensitivities",
 }
 
-_MODULES = {"errors", "links", "plot"}
+_MODULES = {"errors", "links", "measures", "plot"}
 
 __all__ = [*_HOMES]
 

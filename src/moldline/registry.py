@@ -6,18 +6,36 @@ from typing import Any
 
 from .errors import ParameterError
 
-GROUP = "moldline.deformers"
+GROUPS = {"deformers": "moldline.deformers", "measures": "moldline.measures"}
 
 
 def deformers() -> list[str]:
     """Names of all installed deformers."""
-    return sorted({point.name for point in entry_points(group=GROUP)})
+    return _names("deformers")
+
+
+def measures() -> list[str]:
+    """Names of all installed measures."""
+    return _names("measures")
+
+
+def deformer(name: str) -> Any:
+    """The deformer that is installed under a name."""
+    return _named("deformers", name)
+
+
+def measure(name: str) -> Any:
+    """The measure that is installed under a name."""
+    return _named("measures", name)
+
+
+def _names(kind: str) -> list[str]:
+    return sorted({point.name for point in entry_points(group=GROUPS[kind])})
 
 
 @cache
-def deformer(name: str) -> Any:
-    """The class that is installed under a name."""
-    found = {point.name: point for point in entry_points(group=GROUP)}
+def _named(kind: str, name: str) -> Any:
+    found = {point.name: point for point in entry_points(group=GROUPS[kind])}
     if name not in found:
-        raise ParameterError(f"no deformers named {name!r}; installed: {', '.join(deformers())}")
+        raise ParameterError(f"no {kind} named {name!r}; installed: {', '.join(sorted(found))}")
     return found[name].load()

@@ -19,10 +19,11 @@ from moldline.measures.monotonicity import Monotonicity
 from moldline.measures.position import Position
 from moldline.measures.regions import Fixed, Rigid, Symmetry
 from moldline.measures.separation import Separation
-from moldline.measures.smoothness import BendingEnergy
+from moldline.measures.bending_energy import BendingEnergy
 from moldline.measures.spot import Spot
 from moldline.measures.straightness import Linearity, Planarity
-from moldline.measures.thickness import RayThickness, Thickness
+from moldline.measures.ray_thickness import RayThickness
+from moldline.measures.thickness import Thickness
 from moldline.measures.volume import Volume
 
 V = Spot.vertex
@@ -140,7 +141,7 @@ def test_straight_edges_and_flat_regions_miss_by_nothing():
     bent = line + np.outer(share * (1 - share), [0.0, 0.0, 1.0])
     assert np.linalg.norm(numbers(measure, bent)) > 0.1
     flat = Planarity([V(i) for i in (0, 1, 2, 3, 5)])
-    assert numbers(flat) == pytest.approx([0.0, -4.0], abs=1e-12) or numbers(flat)[0] == 0.0
+    assert numbers(flat) == pytest.approx([0.0, -4.0], abs=1e-12)
 
 
 def test_rows_rise_where_they_are_monotone():
@@ -181,7 +182,7 @@ def test_bending_energy_is_zero_for_flat_motions_and_grows_as_the_square(ball):
 def test_symmetry_pairs_points_and_refuses_those_without_partner(ball):
     points = np.asarray(ball.points)
     assert numbers(Symmetry(points, "y"), points) == pytest.approx(0, abs=1e-12)
-    with pytest.raises(ParameterError, match=r"point \d+ at .* has no mirror image across y = 0"):
+    with pytest.raises(ParameterError, match=r"the point at .* has no mirror image across y = 0"):
         Symmetry(points + np.array([0, 0.1, 0]), "y")
 
 
@@ -205,16 +206,11 @@ MANY = [
 ]
 
 
-@pytest.mark.parametrize("make", MANY, ids=lambda make: type(make(*_unit())).__name__)
+@pytest.mark.parametrize("make", MANY)
 def test_derivatives_are_exact(make, ball):
     rng = np.random.default_rng(1)
     points = np.asarray(ball.points) + 0.005 * rng.normal(size=ball.points.shape)
     prove(make(points, np.asarray(ball.faces)), points, 1e-3 * rng.normal(size=points.shape))
-
-
-def _unit():
-    rng = np.random.default_rng(0)
-    return rng.normal(size=(642, 3)), np.array([[0, 1, 2]])
 
 
 def test_what_cannot_be_measured_is_refused():

@@ -1,16 +1,19 @@
 """Twist, incidence, and the angle at an edge."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Points, Vector
+from ..errors import ParameterError
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import direction
+from .directions import Along, Way, direction
+from .needs import up as upwards
+from .picks import Place, chord_ends, spot
 from .spot import Spot, gathered
+from .stations import station
 
 
 class Incidence(AbstractMeasure):
@@ -29,16 +32,32 @@ class Incidence(AbstractMeasure):
     ahead: Float[np.ndarray, "3"]
     up: Float[np.ndarray, "3"]
 
-    def __init__(
-        self,
-        leading: Spot,
-        trailing: Spot,
-        ahead: str | Sequence[float] = "x",
-        up: str | Sequence[float] = "z",
-    ):
+    def __init__(self, leading: Spot, trailing: Spot, ahead: Along = "x", up: Along = "z"):
         self.reads, matrix = gathered([leading, trailing])
         self.matrix = matrix[1] - matrix[0]
         self.ahead, self.up = direction(ahead), direction(up)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        leading: Place | None = None,
+        trailing: Place | None = None,
+        at: float | None = None,
+        component: str | None = None,
+        ahead: Way = "x",
+        up: Way | None = None,
+    ) -> "Incidence":
+        """Of two spots, or of the chord of a wing at the station y = `at`, or of a section."""
+        if (leading is None) != (trailing is None):
+            raise ParameterError("an angle between spots needs leading and trailing")
+        if leading is None or trailing is None:
+            ends = chord_ends(geometry, at, component, "an incidence")
+        else:
+            ends = spot(geometry, leading), spot(geometry, trailing)
+        return cls(*ends, ahead, up or upwards(geometry))
 
     @property
     @override
@@ -52,14 +71,49 @@ class Incidence(AbstractMeasure):
 
 
 class Opening(AbstractMeasure):
-    """Angle between the lines from one spot to two others [rad]: a trailing edge's."""
+    """Angle between the lines from one spot to two others [rad]: a trailing edge's.
+
+    Of a blunt edge the lines begin at its two corners; the apex is then the pair of them. It has no
+    derivative where the angle is zero.
+    """
 
     reads: np.ndarray
     matrix: Float[np.ndarray, "2 r"]
 
-    def __init__(self, apex: Spot, one: Spot, other: Spot):
-        self.reads, matrix = gathered([apex, one, other])
-        self.matrix = matrix[1:] - matrix[0]
+    def __init__(self, apex: Spot | tuple[Spot, Spot], one: Spot, other: Spot):
+        first, second = (apex, apex) if isinstance(apex, Spot) else apex
+        self.reads, matrix = gathered([first, second, one, other])
+        self.matrix = matrix[2:] - matrix[:2]
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        apex: Place | None = None,
+        one: Place | None = None,
+        other: Place | None = None,
+        at: float | None = None,
+        component: str | None = None,
+        length: float = 0.02,
+    ) -> "Opening":
+        """Of three spots, or of the trailing edge of a wing at the station y = `at`, or a section.
+
+        `length` says how far before the trailing edge its sides are read, in chords.
+        """
+        if apex is not None and one is not None and other is not None:
+            return cls(*(spot(geometry, place) for place in (apex, one, other)))
+        if not apex is one is other is None:
+            raise ParameterError("an angle at a spot needs apex, one and other")
+        if not 0 < length < 1:
+            raise ParameterError(f"length is a part of the chord between 0 and 1, got {length}")
+        cut = station(geometry, at, component, "an opening")
+        corners, sides = (
+            tuple(Spot(*cut.foot(fraction, side)) for side in ("upper", "lower"))
+            for fraction in (1.0, 1.0 - length)
+        )
+        return cls((corners[0], corners[1]), *sides)
 
     @property
     @override

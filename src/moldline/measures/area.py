@@ -1,15 +1,15 @@
 """Surface area, and the area of its shadow."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Faces, Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
-from .directions import direction
+from .directions import Along, Way, direction
+from .needs import faces_of
 
 
 class Area(AbstractMeasure):
@@ -20,6 +20,12 @@ class Area(AbstractMeasure):
 
     def __init__(self, faces: Faces):
         self.reads, self.corners = as_rows(np.asarray(faces))
+
+    @classmethod
+    @override
+    def build(cls, geometry: Geometry, *, component: str | None = None) -> "Area":
+        """Of a surface, or of one component."""
+        return cls(faces_of(geometry, component, "an area"))
 
     @property
     @override
@@ -42,9 +48,17 @@ class ProjectedArea(AbstractMeasure):
     corners: Int[np.ndarray, "m 3"]
     along: Float[np.ndarray, "3"]
 
-    def __init__(self, faces: Faces, along: str | Sequence[float]):
+    def __init__(self, faces: Faces, along: Along = "z"):
         self.reads, self.corners = as_rows(np.asarray(faces))
         self.along = direction(along)
+
+    @classmethod
+    @override
+    def build(
+        cls, geometry: Geometry, *, along: Way = "z", component: str | None = None
+    ) -> "ProjectedArea":
+        """Of a surface, or of one component; seen from above by default."""
+        return cls(faces_of(geometry, component, "a projected area"), along)
 
     @property
     @override

@@ -1,16 +1,18 @@
 """Camber: how far the middle of a section is above its chord."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import direction
+from .directions import Along, direction
+from .needs import span
+from .picks import ends_of
 from .spot import Spot, gathered
+from .stations import station
 
 
 class Camber(AbstractMeasure):
@@ -33,11 +35,26 @@ class Camber(AbstractMeasure):
         lower: Spot,
         upper: Spot,
         chord: tuple[Spot, Spot],
-        normal: str | Sequence[float] = "y",
+        normal: Along = "y",
     ):
         self.reads, matrix = gathered([lower, upper, *chord])
         self.matrix = np.stack([(matrix[0] + matrix[1]) / 2 - matrix[2], matrix[3] - matrix[2]])
         self.normal = direction(normal)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        chord: float = 0.5,
+        at: float | None = None,
+        component: str | None = None,
+    ) -> "Camber":
+        """At a fraction of the chord of a wing at the station y = `at`, or of a section."""
+        cut = station(geometry, at, component, "a camber")
+        lower, upper = (Spot(*cut.foot(chord, side)) for side in ("lower", "upper"))
+        return cls(lower, upper, ends_of(cut), span(geometry))
 
     @property
     @override

@@ -1,15 +1,15 @@
 """The middle of the volume that a closed surface encloses."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Faces, Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
-from .directions import directions
+from .directions import Along, Way, directions
+from .needs import faces_of
 
 
 class Centroid(AbstractMeasure):
@@ -19,9 +19,17 @@ class Centroid(AbstractMeasure):
     corners: Int[np.ndarray, "m 3"]
     along: Float[np.ndarray, "k 3"]
 
-    def __init__(self, faces: Faces, along: str | Sequence[float] | None = None):
+    def __init__(self, faces: Faces, along: Along | None = None):
         self.reads, self.corners = as_rows(np.asarray(faces))
         self.along = directions(along)
+
+    @classmethod
+    @override
+    def build(
+        cls, geometry: Geometry, *, along: Way | None = None, component: str | None = None
+    ) -> "Centroid":
+        """Of a surface, or of one component; all three coordinates by default."""
+        return cls(faces_of(geometry, component, "a centroid"), along)
 
     @property
     @override

@@ -9,9 +9,17 @@ from typing_extensions import override
 
 from .._types import Points, Vector
 from ..errors import ParameterError
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import direction
+from .directions import Along, Way, direction
+from .needs import span
+from .picks import Place, Region
+from .picks import spots as picked
 from .spot import Spot, gathered
+from .stations import station
+
+AROUND = (0.04, 0.16, 0.36, 0.64, 1.0)
+"""Where a nose is read on both sides, in parts of how far it is read: even steps around it."""
 
 
 class EdgeRadius(AbstractMeasure):
@@ -31,9 +39,34 @@ class EdgeRadius(AbstractMeasure):
     matrix: Float[np.ndarray, "s r"]
     plane: Float[np.ndarray, "2 3"]
 
-    def __init__(self, spots: Sequence[Spot], normal: str | Sequence[float] = "y"):
+    def __init__(self, spots: Sequence[Spot], normal: Along = "y"):
         self.reads, self.matrix = gathered(_three(spots))
         self.plane = spanned(normal)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        spots: list[Place] | None = None,
+        at: float | None = None,
+        component: str | None = None,
+        length: float = 0.01,
+        normal: Way | None = None,
+    ) -> "EdgeRadius":
+        """Of spots, or of the leading edge of a wing at the station y = `at`, or of a section.
+
+        `length` says how far behind the leading edge its sides are read, in chords.
+        """
+        if spots is not None:
+            around = picked(geometry, spots, None, "a radius")
+        else:
+            cut = station(geometry, at, component, "a leading edge's radius")
+            around = [Spot(*cut.foot(0.0, "upper"))]
+            for side in ("upper", "lower"):
+                around += [Spot(*cut.foot(length * part, side)) for part in AROUND]
+        return cls(around, normal or span(geometry))
 
     @property
     @override
@@ -53,9 +86,22 @@ class Circularity(AbstractMeasure):
     matrix: Float[np.ndarray, "s r"]
     plane: Float[np.ndarray, "2 3"]
 
-    def __init__(self, spots: Sequence[Spot], normal: str | Sequence[float] = "x"):
+    def __init__(self, spots: Sequence[Spot], normal: Along = "x"):
         self.reads, self.matrix = gathered(_three(spots))
         self.plane = spanned(normal)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        spots: list[Place] | None = None,
+        region: Region | None = None,
+        normal: Way = "x",
+    ) -> "Circularity":
+        """Of spots, of the vertices of a region, or both."""
+        return cls(picked(geometry, spots, region, "a circle"), normal)
 
     @property
     @override
@@ -82,7 +128,7 @@ def circle(
     return middle + centre, jnp.sqrt(rest + centre @ centre)
 
 
-def spanned(normal: str | Sequence[float]) -> Float[np.ndarray, "2 3"]:
+def spanned(normal: Along) -> Float[np.ndarray, "2 3"]:
     """Two unit vectors of the plane across a direction."""
     along = direction(normal)
     one = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])

@@ -4,12 +4,14 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from typing_extensions import override
 
-from .._types import Faces, Points, Vector
+from .._types import Faces, Points, Scalar, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
-from .directions import direction
+from .directions import Along, Way, direction
+from .needs import faces_of
 
 
 class CrossSection(AbstractMeasure):
@@ -31,10 +33,25 @@ class CrossSection(AbstractMeasure):
     along: Float[np.ndarray, "3"]
     at: Float[np.ndarray, "k"]
 
-    def __init__(self, faces: Faces, along: str | Sequence[float], at: float | Sequence[float]):
+    def __init__(
+        self, faces: Faces, along: Along, at: float | Sequence[float] | Float[np.ndarray, "k"]
+    ):
         self.reads, self.corners = as_rows(np.asarray(faces))
         self.along = direction(along)
         self.at = np.atleast_1d(np.asarray(at, float))
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        at: float | list[float],
+        along: Way = "y",
+        component: str | None = None,
+    ) -> "CrossSection":
+        """Of a surface, or of one component, at places along the span by default."""
+        return cls(faces_of(geometry, component, "a cross-section"), along, at)
 
     @property
     @override
@@ -45,7 +62,7 @@ class CrossSection(AbstractMeasure):
     def of(self, places: Points) -> Vector:
         return jnp.stack([self._area(places, at) for at in self.at])
 
-    def _area(self, places: Points, at: float) -> Float[jnp.ndarray, ""]:
+    def _area(self, places: Points, at: Scalar) -> Float[jnp.ndarray, ""]:
         height = places @ self.along - at
         corners = [self.corners[:, i] for i in range(3)]
         total = jnp.zeros(())
@@ -66,7 +83,7 @@ def _crossing(
     height: Float[jnp.ndarray, "r"],
     start: Int[np.ndarray, "m"],
     end: Int[np.ndarray, "m"],
-    crosses: Float[jnp.ndarray, "m"],
+    crosses: Bool[jnp.ndarray, "m"],
 ) -> Float[jnp.ndarray, "m 3"]:
     rise = jnp.where(crosses, height[start] - height[end], 1.0)
     share = (height[start] / rise)[:, None]

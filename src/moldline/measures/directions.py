@@ -1,14 +1,21 @@
 """Directions by name or by numbers."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from jaxtyping import Float
 
 from ..errors import ParameterError
 
+Way: TypeAlias = str | tuple[float, float, float]
+"""A direction as a case file has it: the names of axes, or a vector."""
 
-def directions(along: str | Sequence[float] | None) -> Float[np.ndarray, "k 3"]:
+Along: TypeAlias = str | Sequence[float] | Float[np.ndarray, "3"]
+"""A direction as Python has it."""
+
+
+def directions(along: Along | None) -> Float[np.ndarray, "k 3"]:
     """Unit vectors: of axes such as "z" or "xz", of one vector; all three axes by default."""
     if along is None:
         return np.eye(3)
@@ -19,9 +26,11 @@ def directions(along: str | Sequence[float] | None) -> Float[np.ndarray, "k 3"]:
     return direction(along)[None]
 
 
-def direction(along: str | Sequence[float]) -> Float[np.ndarray, "3"]:
+def direction(along: Along) -> Float[np.ndarray, "3"]:
     """One unit vector."""
     if isinstance(along, str):
+        if len(along) != 1:
+            raise ParameterError(f"one direction is x, y or z, got {along!r}")
         return directions(along)[0]
     vector = np.asarray(along, float)
     length = np.linalg.norm(vector) if vector.shape == (3,) else 0.0

@@ -6,7 +6,9 @@ from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure
+from .picks import Place, spot
 from .spot import Spot, gathered
 
 
@@ -22,6 +24,12 @@ class Distance(AbstractMeasure):
     def __init__(self, start: Spot, end: Spot):
         self.reads, matrix = gathered([start, end])
         self.matrix = matrix[1] - matrix[0]
+
+    @classmethod
+    @override
+    def build(cls, geometry: Geometry, *, start: Place, end: Place) -> "Distance":
+        """Of two spots."""
+        return cls(spot(geometry, start), spot(geometry, end))
 
     @property
     @override

@@ -8,8 +8,12 @@ from typing_extensions import override
 
 from .._types import Points, Vector
 from ..errors import ParameterError
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import direction
+from .directions import Along, Way, direction
+from .needs import up
+from .picks import Place
+from .picks import spots as picked
 from .spot import Spot, gathered
 
 
@@ -20,12 +24,21 @@ class Monotonicity(AbstractMeasure):
     matrix: Float[np.ndarray, "s r"]
     along: Float[np.ndarray, "3"]
 
-    def __init__(self, spots: Sequence[Spot], along: str | Sequence[float]):
+    def __init__(self, spots: Sequence[Spot], along: Along):
         if len(spots) < 2:
             raise ParameterError(f"a row needs two spots or more, got {len(spots)}")
         self.reads, matrix = gathered(spots)
         self.matrix = np.diff(matrix, axis=0)
         self.along = direction(along)
+
+    @classmethod
+    @override
+    def build(
+        cls, geometry: Geometry, *, spots: list[Place], along: Way | None = None
+    ) -> "Monotonicity":
+        """Of spots in a row; upwards by default."""
+        row = picked(geometry, spots, None, "a row")
+        return cls(row, along or up(geometry))
 
     @property
     @override

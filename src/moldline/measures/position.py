@@ -1,14 +1,16 @@
 """Where a place on the shape is."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import directions
+from .directions import Along, Way, directions
+from .needs import room
+from .picks import Place
+from .picks import spot as picked
 from .spot import Spot, gathered
 
 
@@ -27,9 +29,15 @@ class Position(AbstractMeasure):
     matrix: Float[np.ndarray, "1 r"]
     along: Float[np.ndarray, "k 3"]
 
-    def __init__(self, spot: Spot, along: str | Sequence[float] | None = None):
+    def __init__(self, spot: Spot, along: Along | None = None):
         self.reads, self.matrix = gathered([spot])
         self.along = directions(along)
+
+    @classmethod
+    @override
+    def build(cls, geometry: Geometry, *, spot: Place, along: Way | None = None) -> "Position":
+        """Of one spot; along x and y of a section."""
+        return cls(picked(geometry, spot), along or room(geometry))
 
     @property
     @override

@@ -1,14 +1,15 @@
 """Where one place on the shape is, seen from another: thickness as a vector."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
 from .._types import Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure
-from .directions import directions
+from .directions import Along, Way, directions
+from .needs import room
+from .picks import Place, spot
 from .spot import Spot, gathered
 
 
@@ -29,10 +30,18 @@ class Separation(AbstractMeasure):
     matrix: Float[np.ndarray, "r"]
     along: Float[np.ndarray, "k 3"]
 
-    def __init__(self, start: Spot, end: Spot, along: str | Sequence[float] | None = None):
+    def __init__(self, start: Spot, end: Spot, along: Along | None = None):
         self.reads, matrix = gathered([start, end])
         self.matrix = matrix[1] - matrix[0]
         self.along = directions(along)
+
+    @classmethod
+    @override
+    def build(
+        cls, geometry: Geometry, *, start: Place, end: Place, along: Way | None = None
+    ) -> "Separation":
+        """Of two spots; along x and y of a section."""
+        return cls(spot(geometry, start), spot(geometry, end), along or room(geometry))
 
     @property
     @override

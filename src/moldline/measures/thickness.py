@@ -1,17 +1,25 @@
-"""Thickness: between fixed places of a shape, or along rays through it."""
+"""Thickness between fixed places of a shape: toothpicks."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from typing_extensions import override
 
-from .._types import Array, Points, Vector
+from .._types import Points, Vector
 from ..errors import ParameterError
-from .base import AbstractMeasure, as_rows
-from .directions import direction
+from ..mesh import Geometry
+from .base import AbstractMeasure
+from .directions import Along, Way, direction
+from .needs import up
+from .picks import Place, ends_of, spot
 from .spot import Spot, gathered
+from .stations import Station, station
+
+Ends: TypeAlias = tuple[Spot, Spot]
+Several: TypeAlias = float | Sequence[float]
 
 
 class Thickness(AbstractMeasure):
@@ -22,97 +30,112 @@ class Thickness(AbstractMeasure):
     Attributes
     ----------
     matrix
-        What of the points read each upper spot less its lower one is; the last row, where there is
-        a chord, is its trailing less its leading edge.
+        What of the points read each upper spot less its lower one is.
+    chords
+        What the chord of each is, trailing less leading edge; no rows where there is none.
     """
 
     reads: np.ndarray
     matrix: Float[np.ndarray, "s r"]
+    chords: Float[np.ndarray, "c r"]
     along: Float[np.ndarray, "3"]
-    is_relative: bool
 
     def __init__(
         self,
         lower: Sequence[Spot],
         upper: Sequence[Spot],
-        along: str | Sequence[float] = "z",
-        chord: tuple[Spot, Spot] | None = None,
+        along: Along = "z",
+        chord: Ends | Sequence[Ends] | None = None,
     ):
         if len(lower) != len(upper) or not lower:
             raise ParameterError(f"as many upper as lower spots, got {len(upper)}, {len(lower)}")
-        pairs = [*zip(lower, upper, strict=True), *([chord] if chord else [])]
+        chords = own_chords(chord, len(lower))
+        pairs = [*zip(lower, upper, strict=True), *chords]
         self.reads, matrix = gathered([spot for pair in pairs for spot in pair])
-        self.matrix = matrix[1::2] - matrix[::2]
+        matrix = matrix[1::2] - matrix[::2]
+        self.matrix, self.chords = matrix[: len(lower)], matrix[len(lower) :]
         self.along = direction(along)
-        self.is_relative = chord is not None
+
+    @classmethod
+    def over(
+        cls,
+        geometry: Geometry,
+        chord: Several,
+        at: Several | None = None,
+        component: str | None = None,
+        along: Along | None = None,
+        relative: bool = False,
+    ) -> "Thickness":
+        """Toothpicks at fractions of the chord, for each station y = `at` of a wing in turn."""
+        lower, upper, chords = picks_over(geometry, chord, at, component)
+        return cls(lower, upper, along or up(geometry), chords if relative else None)
+
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        lower: list[Place] | None = None,
+        upper: list[Place] | None = None,
+        chord: float | list[float] | None = None,
+        at: float | list[float] | None = None,
+        component: str | None = None,
+        along: Way | None = None,
+        relative: bool = False,
+    ) -> "Thickness":
+        """Between lower and upper spots, or at fractions of the chord over stations y = `at`.
+
+        Upwards by default; `relative` divides by the length of the chord at the station.
+        """
+        if chord is not None and lower is None and upper is None:
+            return cls.over(geometry, chord, at, component, along, relative)
+        if lower is None or upper is None or chord is not None or at is not None or relative:
+            raise ParameterError("a thickness is said by lower and upper spots, or by chord and at")
+        low, high = ([spot(geometry, place) for place in places] for places in (lower, upper))
+        return cls(low, high, along or up(geometry))
 
     @property
     @override
     def size(self) -> int:
-        return len(self.matrix) - self.is_relative
+        return len(self.matrix)
 
     @property
     @override
     def is_affine(self) -> bool:
-        return not self.is_relative
+        return not len(self.chords)
 
     @override
     def of(self, places: Points) -> Vector:
-        separations = self.matrix @ places
-        heights = separations @ self.along
-        if not self.is_relative:
+        heights = self.matrix @ places @ self.along
+        if not len(self.chords):
             return heights
-        return heights[:-1] / jnp.linalg.norm(separations[-1])
+        return heights / jnp.linalg.norm(self.chords @ places, axis=1)
 
 
-class RayThickness(AbstractMeasure):
-    """What of each ray lies within closed faces [m], however the shape moves along it.
+def own_chords(chord: Ends | Sequence[Ends] | None, count: int) -> list[Ends]:
+    """The chord of each of some places: one for all, or one each, or none at all."""
+    if chord is None:
+        return []
+    if isinstance(chord[0], Spot):
+        return [(chord[0], chord[1])] * count  # type: ignore[list-item]
+    if len(chord) != count:
+        raise ParameterError(f"one chord, or one for each of {count} places, got {len(chord)}")
+    return list(chord)  # type: ignore[arg-type]
 
-    Attributes
-    ----------
-    origins
-        A point of each ray; it runs both ways.
-    along
-        Direction of all rays.
 
-    Notes
-    -----
-    It has no derivative where a ray meets an edge of the mesh, and counts one where it does. A ray
-    that misses the shape has thickness zero.
-    """
-
-    reads: np.ndarray
-    corners: Int[np.ndarray, "m 3"]
-    origins: Float[np.ndarray, "k 3"]
-    along: Float[np.ndarray, "3"]
-
-    def __init__(
-        self, faces: Array, origins: Sequence[Sequence[float]], along: str | Sequence[float] = "z"
-    ):
-        self.reads, self.corners = as_rows(np.asarray(faces))
-        self.origins = np.atleast_2d(np.asarray(origins, float))
-        self.along = direction(along)
-
-    @property
-    @override
-    def size(self) -> int:
-        return len(self.origins)
-
-    @override
-    def of(self, places: Points) -> Vector:
-        return jnp.stack([self._within(places - origin) for origin in self.origins])
-
-    def _within(self, places: Points) -> Float[jnp.ndarray, ""]:
-        """Heights where the ray leaves less those where it enters."""
-        a, b, c = (places[self.corners[:, i]] for i in range(3))
-        sides = [jnp.cross(p, q) @ self.along for p, q in ((b, c), (c, a), (a, b))]
-        total = sides[0] + sides[1] + sides[2]
-        leaves = (sides[0] > 0) & (sides[1] > 0) & (sides[2] > 0)
-        enters = (sides[0] < 0) & (sides[1] < 0) & (sides[2] < 0)
-        met = leaves | enters
-        safe = jnp.where(met, total, 1.0)
-        weights = [side / safe for side in sides]
-        height = (weights[0][:, None] * a + weights[1][:, None] * b + weights[2][:, None] * c) @ (
-            self.along
-        )
-        return jnp.sum(jnp.where(met, jnp.where(leaves, height, -height), 0.0))
+def picks_over(
+    geometry: Geometry, chord: Several, at: Several | None, component: str | None
+) -> tuple[list[Spot], list[Spot], list[Ends]]:
+    """Lower and upper spots and chords at fractions of the chord, for each station in turn."""
+    stations = np.atleast_1d(np.array(at if at is not None else np.nan, float)).tolist()
+    fractions = np.atleast_1d(np.array(chord, float)).tolist()
+    lower: list[Spot] = []
+    upper: list[Spot] = []
+    chords: list[Ends] = []
+    for y in stations:
+        cut: Station = station(geometry, None if np.isnan(y) else y, component, "a thickness")
+        lower += [Spot(*cut.foot(fraction, "lower")) for fraction in fractions]
+        upper += [Spot(*cut.foot(fraction, "upper")) for fraction in fractions]
+        chords += [ends_of(cut)] * len(fractions)
+    return lower, upper, chords

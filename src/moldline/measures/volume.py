@@ -6,7 +6,9 @@ from jaxtyping import Int
 from typing_extensions import override
 
 from .._types import Faces, Points, Vector
+from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
+from .needs import faces_of
 
 
 class Volume(AbstractMeasure):
@@ -21,6 +23,12 @@ class Volume(AbstractMeasure):
 
     def __init__(self, faces: Faces):
         self.reads, self.corners = as_rows(np.asarray(faces))
+
+    @classmethod
+    @override
+    def build(cls, geometry: Geometry, *, component: str | None = None) -> "Volume":
+        """Of a surface, or of one component."""
+        return cls(faces_of(geometry, component, "a volume"))
 
     @property
     @override

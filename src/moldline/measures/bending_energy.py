@@ -1,4 +1,4 @@
-"""How smooth a shape is, and how smoothly it was bent."""
+"""How smoothly a shape was bent."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -7,8 +7,9 @@ from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Faces, Points, Vector
-from ..mesh import topology
+from ..mesh import Geometry, topology
 from .base import AbstractMeasure, as_rows
+from .needs import faces_of
 
 
 class BendingEnergy(AbstractMeasure):
@@ -33,6 +34,12 @@ class BendingEnergy(AbstractMeasure):
         self.reads, corners = as_rows(np.asarray(faces))
         self.rest = np.asarray(points)[self.reads]
         self.pairs, self.weights, self.areas = _laplacian(self.rest, corners)
+
+    @classmethod
+    @override
+    def build(cls, geometry: Geometry, *, component: str | None = None) -> "BendingEnergy":
+        """Of a surface, or of one component, from where it is now."""
+        return cls(geometry.points, faces_of(geometry, component, "a bending energy"))
 
     @property
     @override

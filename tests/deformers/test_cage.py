@@ -124,6 +124,20 @@ def test_a_finer_cage_begins_with_the_same_shape(places):
     )
 
 
+@pytest.mark.parametrize("make", [elbow, wing, lambda: box((3, 5, 3), (1.0, 2.0, 0.4))])
+def test_a_cage_with_its_own_cells_is_refined_twice(make):
+    """Lines of its grid pass through middles of edges, which are corners of the finer cages."""
+    points, faces = make()
+    coarse = ml.Cage(points, faces, cells=(12, 24, 8))
+    fine, once = coarse.refined()
+    finer, twice = fine.refined()
+    places = inside(points, faces, 300)
+    controls = 0.1 * np.random.default_rng(0).normal(size=coarse.size)
+    expected = coarse.bind(places)(controls)
+    for cage, moves in ((fine, once @ controls), (finer, twice @ (once @ controls))):
+        np.testing.assert_allclose(cage.bind(places)(moves), expected, rtol=0, atol=1e-12)
+
+
 BROKEN = {
     "open": (lambda: (POINTS, FACES[1:]), "the cage is open at 3 edges, near"),
     "crossing": (

@@ -285,8 +285,7 @@ class Cage(AbstractControlNet):
         """A cage of more points, and the matrix that takes controls of this one to its.
 
         Each triangle is cut in four, so the cage stays where it is, and on the same grid harmonic
-        coordinates give the same shape to rounding. It takes a cage whose grid passes through no
-        middle of an edge; an error says so when points are bound.
+        coordinates give the same shape to rounding.
         """
         points, faces, weights = subdivided(self.rest, self.shape.faces)
         cells, shift = None, None

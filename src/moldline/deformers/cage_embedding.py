@@ -30,7 +30,7 @@ TOUCHING = 1e-6
 TRIED = 2000
 """Points that tell whether a sparse table is worth it."""
 
-FORMAT = 1
+FORMAT = 2
 """Of the kept weights; others are made anew."""
 
 

@@ -1,8 +1,8 @@
 """A Cartesian grid fitted to a cage: what is inside, its links, and what is near it outside.
 
 Lengths are in units of the grid's spacing, which each axis has its own of; node (i, j, k) is at
-(i, j, k). Grid lines may not pass through corners of the cage. Whether a node is inside is counted
-along all three axes, which must agree; where they do not, the grid is moved and tried again.
+(i, j, k). No node may lie on the cage. Whether a node is inside is counted along all three axes,
+which must agree; where they do not, the grid is moved and tried again.
 """
 
 from collections.abc import Sequence
@@ -17,6 +17,9 @@ from .multigrid import Hits, Links
 
 SHIFTS = ((0.5, 0.5, 0.5), (0.382, 0.414, 0.449), (0.618, 0.146, 0.303), (0.236, 0.732, 0.568))
 """Where the first node lies before the cage's lowest point; the first one keeps mirror symmetry."""
+
+NEAR = 1e-11
+"""Corners this near to a grid line are on it, nodes this near to the cage on that."""
 
 PAD = 2
 """Further nodes around the cage, so that a look-up never leaves the grid."""
@@ -97,7 +100,7 @@ def fitted(
     spacing = extent / np.asarray(cells)
     for number in range(len(SHIFTS)) if shift is None else [shift]:
         origin = low - (PAD - 1 + np.array(SHIFTS[number])) * spacing
-        corners = np.ascontiguousarray((points - origin) / spacing)
+        corners = _snapped((points - origin) / spacing)
         cuts = tuple(_cut(corners, faces, axis, shape) for axis in range(3))
         inside = _inside(cuts, shape)
         if inside is not None:
@@ -105,13 +108,19 @@ def fitted(
             return Grid(origin, spacing, corners, faces, cuts, index, number)  # type: ignore[arg-type]
     if shift is not None:
         raise GeometryError(
-            f"lines of the grid of {' x '.join(map(str, cells))} cells pass through corners of the "
-            "cage; give one cell more or less"
+            f"nodes of the grid of {' x '.join(map(str, cells))} cells lie on the cage; give one "
+            "cell more or less"
         )
     raise GeometryError(
         f"lines along x, y and z through the cage of {len(points)} points and {len(faces)} "
         "triangles disagree on what is inside; a cage must be closed and must not cross itself"
     )
+
+
+def _snapped(corners: np.ndarray) -> np.ndarray:
+    """Corners that rounding put beside a grid line are on it: what is left of what is exact."""
+    lines = np.rint(corners)
+    return np.ascontiguousarray(np.where(np.abs(corners - lines) <= NEAR, lines, corners))
 
 
 def _cut(corners: np.ndarray, faces: np.ndarray, axis: int, shape: np.ndarray) -> Cut:
@@ -128,10 +137,11 @@ def _cut(corners: np.ndarray, faces: np.ndarray, axis: int, shape: np.ndarray) -
 
 
 def _inside(cuts: tuple[Cut, ...], shape: np.ndarray) -> np.ndarray | None:
-    """Which nodes are inside; None if the three axes do not agree."""
+    """Which nodes are inside; None if the three axes do not agree, or a node is on the cage."""
     votes = np.zeros(shape, np.uint8)
     for axis, cut in enumerate(cuts):
-        if np.any(np.diff(cut.start) % 2):
+        is_on = np.abs(cut.place - np.rint(cut.place)) <= NEAR
+        if np.any(np.diff(cut.start) % 2) or np.any(is_on):
             return None
         loops.vote(axis, shape, cut.start, cut.place, votes)
     return votes == 3 if np.all(votes % 3 == 0) else None

@@ -24,8 +24,16 @@ def _turn(p: np.ndarray, i: int, j: int, x: float, y: float, b: int, c: int) -> 
 
 
 @_compiled
-def _left(value: float, i: int, j: int) -> bool:
-    return value >= 0 if i < j else value > 0
+def _left(p: np.ndarray, i: int, j: int, value: float, b: int, c: int) -> bool:
+    """Whether (x, y) is left of the edge; on it, whether (x + e, y + e²) is, for a tiny e.
+
+    So a line through a corner meets one triangle going in and one going out, as one beside it does.
+    """
+    if value == 0:
+        value = p[i, c] - p[j, c]
+    if value == 0:
+        value = p[j, b] - p[i, b]
+    return value > 0
 
 
 @_compiled
@@ -55,8 +63,8 @@ def hits(
                 u = _turn(p, j, k, x, y, b, c)
                 v = _turn(p, k, i, x, y, b, c)
                 w = _turn(p, i, j, x, y, b, c)
-                side = _left(u, j, k)
-                if side != _left(v, k, i) or side != _left(w, i, j):
+                side = _left(p, j, k, u, b, c)
+                if side != _left(p, k, i, v, b, c) or side != _left(p, i, j, w, b, c):
                     continue
                 total = u + v + w
                 if total == 0:

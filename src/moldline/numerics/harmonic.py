@@ -67,7 +67,7 @@ class Harmonic:
         self,
         points: Float[np.ndarray, "m 3"],
         faces: Int[np.ndarray, "t 3"],
-        cells: int | Sequence[int] | None = None,
+        cells: float | Sequence[float] | None = None,
         progress: bool = False,
         shift: int | None = None,
     ):
@@ -129,9 +129,9 @@ class Harmonic:
         return looked_up(self._jax_tables, jax.numpy.asarray(points))
 
 
-def _counted(cells: int | Sequence[int]) -> tuple[int, int, int]:
-    counts = (cells,) * 3 if isinstance(cells, int) else tuple(cells)
-    if len(counts) != 3 or any(int(n) != n or n < 2 for n in counts):
+def _counted(cells: float | Sequence[float]) -> tuple[int, int, int]:
+    counts = tuple(cells) if isinstance(cells, Sequence) else (cells,) * 3
+    if len(counts) != 3 or not all(float(n).is_integer() and n >= 2 for n in counts):
         raise ParameterError(f"cells must be a whole number or three, at least 2, got {cells}")
     return tuple(map(int, counts))  # type: ignore[return-value]
 

@@ -211,6 +211,13 @@ def test_no_soup_makes_it_fail(points, faces):
     assert np.isfinite(points[np.array(faces, int).reshape(-1, 3)[found.pairs]]).all()
 
 
+def test_corners_that_rounding_puts_in_one_place_are_no_error():
+    points = np.full((6, 3), -3e152)
+    points[1, 0], points[2, 1], points[3, 1], points[4, 2] = 0.0, 3e164, 0.0, 1e141
+    found = self_intersections(points, np.array([[1, 2, 4], [0, 3, 4]]))
+    assert np.isfinite(found.places).all()
+
+
 def test_the_search_stops_where_all_is_tangled():
     random = np.random.default_rng(0)
     points = random.normal(size=(3000, 3))

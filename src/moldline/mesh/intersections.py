@@ -11,6 +11,9 @@ from . import topology
 MOST = 100_000
 """Pairs after which the search stops: what is all tangled must not fill the memory."""
 
+FARTHEST = 1e7
+"""Along a line of two planes that is not `_PARALLEL` to nothing, in sizes of the surface."""
+
 _PARALLEL = 1e-6
 """Planes whose normals' cross product is below this have no line in common worth computing."""
 
@@ -120,6 +123,7 @@ def _places(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     low, high = np.full(len(a), -np.inf), np.full(len(a), np.inf)
     for corners, normal in ((a, n), (b, m)):
         low, high = _clipped(start, along, low, high, corners, normal)
+    low, high = np.clip((low, high), -FARTHEST, FARTHEST)  # where rounding leaves no end
     places[is_line] = start + ((low + high) / 2)[:, None] * along
     return middle[:, 0] + places
 

@@ -1,10 +1,12 @@
 """Skeletons: how bones move, how points follow them, and what Blender makes of the same."""
 
+import json
 import math
 
 import jax
 import numpy as np
 import pytest
+from numerics.cages import box
 from scipy.spatial.transform import Rotation
 
 import moldline as ml
@@ -303,6 +305,53 @@ def test_a_skeleton_is_built_from_a_file_in_a_lattice_around_the_geometry(ball, 
     for left_out in ({"bones": given["bones"]}, given):
         with pytest.raises(ParameterError, match="either cage, a file, or shape"):
             Skeleton.build(ball, **left_out)
+
+
+@pytest.mark.parametrize("given", ["distance", "hand"])
+def test_a_case_file_poses_a_cage_and_keeps_its_weights_beside_it(given, tmp_path, monkeypatch):
+    (tmp_path / "case").mkdir()
+    monkeypatch.chdir(tmp_path)
+    points, faces = box((2, 3, 2), (2.0, 4.0, 2.0))
+    ml.write(tmp_path / "case/cage.obj", ml.Surface(points, faces))
+    ml.write(tmp_path / "case/body.obj", ml.Surface(0.5 * points + [0, 1, 0], faces))
+    LINE.write(tmp_path / "case/bones.toml")
+    hand = np.stack([points[:, 1] < 2, points[:, 1] >= 2], axis=1).astype(float)
+    weights = json.dumps(hand.tolist() if given == "hand" else given)
+    (tmp_path / "case/case.toml").write_text(
+        f"""moldline = 1
+[geometry.body]
+file = "body.obj"
+[variable.turn]
+value = [0.0, 0.0, 0.5]
+[[stage]]
+deformer = "skeleton"
+bones = "bones.toml"
+cage = "cage.obj"
+weights = {weights}
+[[stage.link]]
+variable = "turn"
+link = "named"
+parameter = "out.rotation"
+"""
+    )
+    pipeline = ml.load("case/case.toml").pipeline
+    moved = np.asarray(pipeline.points())
+    own = Skeleton(LINE, ml.Cage(points, faces), weights=hand if given == "hand" else given)
+    turned = own.bind(np.asarray(pipeline.geometry.points))(controls(own, out_rotation=[0, 0, 0.5]))
+    np.testing.assert_allclose(moved, turned, rtol=0, atol=1e-9)
+    assert list((tmp_path / "case/.moldline").iterdir())
+    assert not (tmp_path / ".moldline").exists()
+
+
+def test_rows_of_weights_have_one_length(ball, tmp_path):
+    TREE.write(tmp_path / "bones.toml")
+    with pytest.raises(ParameterError, match="rows of one length, got rows of 2 and 3"):
+        Skeleton.build(
+            ball,
+            bones=tmp_path / "bones.toml",
+            shape=(2, 2, 2),
+            weights=((1.0, 0.0, 0.0), (1.0, 0.0)),
+        )
 
 
 def test_a_large_tree_is_compiled_in_seconds():

@@ -92,13 +92,15 @@ class Skeleton(AbstractPosed):
         degree: int | tuple[int, int, int] = 3,
         low: tuple[float, float, float] | None = None,
         high: tuple[float, float, float] | None = None,
-        weights: Weights = "distance",
+        weights: Weights | tuple[tuple[float, ...], ...] = "distance",
         blend: Blend = "linear",
         axes: PoseAxes = "bone",
+        store: Path = Path(".moldline"),
     ) -> "Skeleton":
         """From a case file: bones from a file, in a cage from a file or a lattice of a shape.
 
-        The lattice lies around the geometry or one component of it, or from low to high.
+        The lattice lies around the geometry or one component of it, or from low to high. Weights by
+        hand are a row for each control point, in the order of the net. `store` is the cage's.
         """
         net: AbstractControlNet
         if shape is not None and cage is None:
@@ -107,10 +109,11 @@ class Skeleton(AbstractPosed):
         elif cage is not None and shape is None:
             from .cage import Cage
 
-            net = Cage.build(geometry, file=cage)
+            net = Cage.build(geometry, file=cage, store=store)
         else:
             raise ParameterError("a skeleton takes either cage, a file, or shape, of a lattice")
-        return cls(Bones.read(bones), net, weights=weights, blend=blend, axes=axes)
+        shares = weights if isinstance(weights, str) else _rows(weights)
+        return cls(Bones.read(bones), net, weights=shares, blend=blend, axes=axes)
 
     @property
     @override
@@ -133,3 +136,12 @@ class Skeleton(AbstractPosed):
         motion = bone_motion.motion(self.bones, self.axes, controls)
         rest = self.net.rest.reshape(-1, 3)
         return bone_motion.displaced(self.bones, motion, self.weights, rest, self.blend).ravel()
+
+
+def _rows(weights: tuple[tuple[float, ...], ...]) -> np.ndarray:
+    lengths = sorted({len(row) for row in weights})
+    if len(lengths) > 1:
+        raise ParameterError(
+            f"weights by hand are rows of one length, got rows of {lengths[0]} and {lengths[-1]}"
+        )
+    return np.array(weights, float)

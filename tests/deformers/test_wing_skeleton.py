@@ -131,6 +131,32 @@ def test_a_chord_grows_about_the_line_that_carries_the_sweep():
     np.testing.assert_allclose(heights, ratio * (before.high - before.low), rtol=1e-12)
 
 
+@pytest.mark.parametrize("at", [0.0, 0.25])
+def test_turned_sections_are_rigid_and_the_line_they_turn_about_is_as_asked_for(at):
+    """Swept by 40 degrees and lifted by 20 in the outer panels, twisted, and a span more."""
+    surface = swept()
+    skeleton = WingSkeleton.fitted(surface, STATIONS, sweep_at=at, twist_at=at, sections="turned")
+    sweep, dihedral = np.array([0, 0, 0.7, 0.7]), np.array([0, 0, 0.35, 0.35])
+    controls = only(skeleton, sweep=sweep, dihedral=dihedral, twist=0.2, span=1.0)
+    before, after = (
+        np.asarray(s.points).reshape(9, len(SECTION), 3)[::2]
+        for s in (surface, moved(skeleton, surface, controls))
+    )
+    for rest, row in zip(before, after, strict=True):
+        lengths = [np.linalg.norm(part[:, None] - part, axis=2) for part in (rest, row)]
+        np.testing.assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-12 * 4)
+    flat = np.ptp(after[..., 1], axis=1)
+    np.testing.assert_allclose(flat[:2], 0, atol=1e-13)
+    assert np.all(flat[2:] > 0.5)
+    plan = planform(surface, STATIONS)
+    line = plan.leading + at * (plan.trailing - plan.leading)
+    found = np.asarray(skeleton.bind(line)(controls))
+    np.testing.assert_allclose(found[:, 1], STATIONS * 1.1, rtol=0, atol=1e-12)
+    for axis, angles in ((0, skeleton.sweep + sweep), (2, skeleton.dihedral + dihedral)):
+        slopes = np.diff(found[:, axis]) / np.diff(found[:, 1])
+        np.testing.assert_allclose(slopes, np.tan(angles), rtol=0, atol=1e-12)
+
+
 def test_what_lies_beyond_the_tip_station_follows_rigidly():
     skeleton = WingSkeleton.fitted(swept(), STATIONS[:-1])
     controls = only(skeleton, twist=0.4, span=1.0, dihedral=0.2, sweep=-0.1)
@@ -188,19 +214,27 @@ def test_a_skeleton_drawn_by_numbers_is_the_fitted_one():
     )
     built = WingSkeleton.build(
         surface, stations=5, span=10.0, root_chord=4.0, taper=0.375, sweep=0.5, dihedral=0.1,
-        twist=tuple(twist), root=root, sweep_at=0.25,
+        twist=tuple(twist), root=root, sweep_at=0.25, sections="turned",
     )  # fmt: skip
+    assert built.sections == "turned"
     np.testing.assert_array_equal(built.values, drawn.values)
 
 
-@pytest.mark.parametrize(("loft", "sides"), [("linear", (1, -1)), ("cubic", (1,))])
-def test_a_wing_skeleton_keeps_the_contract(loft, sides):
+@pytest.mark.parametrize(
+    ("loft", "sides", "options"),
+    [
+        ("linear", (1, -1), {}),
+        ("cubic", (1,), {}),
+        ("linear", (1, -1), {"sections": "turned", "twist_at": 0.0}),
+    ],
+)
+def test_a_wing_skeleton_keeps_the_contract(loft, sides, options):
     """Points between two stations, on both sides of the plane, and beyond the tip."""
     rng = np.random.default_rng(0)
     inside = rng.uniform([0, 2.9, -1], [8, 4.6, 1], (40, 3))
     inside[::2, 1] *= sides[-1]
     outside = rng.uniform([4, 10.5, 0], [8, 12, 2], (20, 3))
-    skeleton = WingSkeleton.fitted(swept(sides=sides), STATIONS, loft=loft)
+    skeleton = WingSkeleton.fitted(swept(sides=sides), STATIONS, loft=loft, **options)
     check(skeleton, np.concatenate([inside, outside]))
 
 
@@ -237,6 +271,8 @@ def test_the_drawn_net_moves_as_its_sections_do(loft):
         (lambda: WingSkeleton.fitted(swept(), [5.0]), "two or more ascending stations"),
         (lambda: WingSkeleton.fitted(swept(), 3, "fin"), "no component named 'fin'"),
         (lambda: WingSkeleton.fitted(swept(), loft="ruled"), "linear or cubic, got 'ruled'"),
+        (lambda: WingSkeleton.fitted(swept(), sections="flat"), "streamwise or turned, got 'flat'"),
+        (lambda: WingSkeleton.fitted(swept(), sections="turned"), "alike, got 0.0 and 0.25"),
         (lambda: WingSkeleton.build(ml.Grid(np.zeros((8, 3)), ((2, 2, 2),))), "a Grid; give span"),
         (lambda: WingSkeleton.build(None, span=5.0, stations=10**12), "stations are 2 to 1000"),
         (lambda: WingSkeleton.drawn(0.0, 1.0), "to y = span, got root"),

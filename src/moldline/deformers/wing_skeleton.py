@@ -1,7 +1,7 @@
 """A wing skeleton: span, chord, sweep, dihedral and twist as controls."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,8 +14,11 @@ from ..errors import GeometryError, ParameterError
 from ..mesh import Surface
 from ..mesh.planform import MOST, Places, Planform, planform
 from ..mesh.slices import NEAR
+from ..numerics.rotation import increments, product, quaternion
 from .loft import Loft, Lofting
 from .posed import AbstractPosed
+
+Sections = Literal["streamwise", "turned"]
 
 ROOM = 0.05
 """What the control points stand off each section, in chords."""
@@ -38,6 +41,10 @@ class WingSkeleton(AbstractPosed):
     reads back from the moved wing is what was asked for, whatever is changed together. With both
     fractions alike twist is a pure rotation about that line.
 
+    On request sections are turned instead of sheared: each but the root's, about its point of that
+    line, by the mean of what sweep and dihedral change beside it. The line has the sweep and
+    dihedral asked for; chord and twist are those of the turned section, not of a streamwise one.
+
     Controls, in this order and by these names in `parameters`: `span` change of the semispan [m],
     `chord` of each station [m], `sweep` and `dihedral` of each panel [rad], `twist` of each
     station [rad]. They are changes; `values` are what the wing has at rest.
@@ -54,6 +61,8 @@ class WingSkeleton(AbstractPosed):
         At rest, from y = 0 to the tip [m].
     sweep_at, twist_at
         Fractions of the chord where sweep, and dihedral and twist, are taken.
+    sections
+        "streamwise" or "turned".
     """
 
     net: Loft
@@ -63,6 +72,7 @@ class WingSkeleton(AbstractPosed):
     semispan: float = eqx.field(static=True)
     sweep_at: float = eqx.field(static=True)
     twist_at: float = eqx.field(static=True)
+    sections: str = eqx.field(static=True)
 
     def __init__(
         self,
@@ -73,7 +83,16 @@ class WingSkeleton(AbstractPosed):
         sweep_at: float = 0.0,
         twist_at: float = 0.25,
         loft: str = "linear",
+        sections: str = "streamwise",
     ):
+        if sections not in Sections.__args__:  # type: ignore[attr-defined]
+            raise ParameterError(f"sections must be streamwise or turned, got {sections!r}")
+        if sections == "turned" and sweep_at != twist_at:
+            raise ParameterError(
+                "turned sections turn about one line: give sweep_at and twist_at alike, got "
+                f"{sweep_at} and {twist_at}"
+            )
+        self.sections = sections
         self.twist, self.semispan = plan.twist, float(semispan)
         self.sweep, self.dihedral = plan.sweep_at(sweep_at), plan.dihedral_at(twist_at)
         self.sweep_at, self.twist_at = float(sweep_at), float(twist_at)
@@ -132,7 +151,7 @@ class WingSkeleton(AbstractPosed):
         sides: Sequence[int] = (1, -1),
         sweep_at: float = 0.0,
         twist_at: float = 0.25,
-        loft: str = "linear",
+        **options: Any,
     ) -> "WingSkeleton":
         """By numbers, which must be those of the wing it is to move.
 
@@ -169,7 +188,7 @@ class WingSkeleton(AbstractPosed):
         plan = Planform(
             places, leading, leading + run, ends.min(axis=0) - half, ends.max(axis=0) + half
         )
-        return cls(plan, span, sides=sides, sweep_at=sweep_at, twist_at=twist_at, loft=loft)
+        return cls(plan, span, sides=sides, sweep_at=sweep_at, twist_at=twist_at, **options)
 
     @classmethod
     @override
@@ -190,12 +209,14 @@ class WingSkeleton(AbstractPosed):
         sweep_at: float = 0.0,
         twist_at: float = 0.25,
         loft: Lofting = "linear",
+        sections: Sections = "streamwise",
     ) -> "WingSkeleton":
         """From a case file: by numbers where it says span, else fitted to the geometry.
 
         By numbers, stations are fractions of span.
         """
         rest: dict[str, Any] = {"sweep_at": sweep_at, "twist_at": twist_at, "loft": loft}
+        rest["sections"] = sections
         if span is None:
             return cls.fitted(geometry, stations, component, **rest)
         if isinstance(stations, int):
@@ -241,28 +262,41 @@ class WingSkeleton(AbstractPosed):
         given = {name: jnp.asarray(controls)[rows] for name, rows in self.parameters.items()}
         reach = self.net.stations - self.net.stations[0]
         stretch = given["span"][0] / reach[-1]
-        chords, turn = self.net.scales, given["twist"]
-        growth = given["chord"] / chords
-        # of scale times rotation, less one: displacements are to be exactly zero at rest
-        along = growth * jnp.cos(turn) - 2 * jnp.sin(turn / 2) ** 2
-        up = (1 + growth) * jnp.sin(turn)
-        slopes = jnp.zeros((len(chords), 3, 2))
-        slopes = slopes.at[:, 0].set(jnp.stack([along, up], axis=1))
-        slopes = slopes.at[:, 2].set(jnp.stack([-up, along], axis=1))
-        run = chords[:, None] * jnp.stack([jnp.cos(self.twist), -jnp.sin(self.twist)], axis=1)
-        moved = jnp.einsum("sij,sj->si", slopes, run)
+        slopes = self._mapped(given)
+        run = jnp.stack([jnp.cos(self.twist), -jnp.sin(self.twist)], axis=1)
+        moved = jnp.einsum("sij,sj->si", slopes, self.net.scales[:, None] * run)
         shifts = [
             self._sheared(self.sweep, given["sweep"], stretch) - self.sweep_at * moved[:, 0],
-            stretch * reach,
+            stretch * reach - self.sweep_at * moved[:, 1],
             self._sheared(self.dihedral, given["dihedral"], stretch) - self.twist_at * moved[:, 2],
         ]
         return self.net.carried(jnp.stack(shifts, axis=1), slopes)
+
+    def _mapped(self, given: dict[str, Array]) -> Float[Array, "s 3 2"]:
+        """The stations' maps of their sections, less one: displacements are zero at rest."""
+        turn, growth = given["twist"], given["chord"] / self.net.scales
+        along = growth * jnp.cos(turn) - 2 * jnp.sin(turn / 2) ** 2
+        up = (1 + growth) * jnp.sin(turn)
+        slopes = jnp.zeros((len(turn), 3, 2))
+        slopes = slopes.at[:, 0].set(jnp.stack([along, up], axis=1))
+        slopes = slopes.at[:, 2].set(jnp.stack([-up, along], axis=1))
+        if self.sections == "streamwise":
+            return slopes
+        aft, rise = (_beside(given[name])[:, None] for name in ("sweep", "dihedral"))
+        turned = product(quaternion(rise * np.eye(3)[0]), quaternion(-aft * np.eye(3)[2]))
+        return slopes + increments(turned) @ (np.eye(3)[:, [0, 2]] + slopes)
 
     def _sheared(self, angles: Array, changes: Array, stretch: Array) -> Float[Array, "s"]:
         """How far a line moves at the stations when its panels' angles change [m]."""
         steeper = jnp.sin(changes) / (jnp.cos(angles) * jnp.cos(angles + changes))
         runs = jnp.diff(self.net.stations) * ((1 + stretch) * steeper + stretch * jnp.tan(angles))
         return jnp.concatenate([jnp.zeros(1), jnp.cumsum(runs)])
+
+
+def _beside(changes: Array) -> Float[Array, "s"]:
+    """By how much stations turn where panels do: none at the root, all at the tip."""
+    middles = (changes[:-1] + changes[1:]) / 2
+    return jnp.concatenate([jnp.zeros(1), middles, changes[-1:]])
 
 
 def _sides(surface: Surface, component: str | None) -> tuple[float, tuple[int, ...]]:

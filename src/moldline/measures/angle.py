@@ -57,7 +57,7 @@ class Incidence(AbstractMeasure):
             ends = chord_ends(geometry, at, component, "an incidence")
         else:
             ends = spot(geometry, leading), spot(geometry, trailing)
-        return cls(*ends, ahead, up or upwards(geometry))
+        return cls(*ends, ahead, upwards(geometry) if up is None else up)
 
     @property
     @override

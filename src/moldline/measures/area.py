@@ -5,7 +5,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from typing_extensions import override
 
-from .._types import Faces, Points, Vector
+from .._types import Array, Faces, Points, Vector
 from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
 from .directions import Along, Way, direction
@@ -71,7 +71,7 @@ class ProjectedArea(AbstractMeasure):
         return 0.5 * jnp.sum(jnp.maximum(shadows, 0.0))[None]
 
 
-def area_vectors(places: Points, corners: Int[np.ndarray, "m 3"]) -> Float[jnp.ndarray, "m 3"]:
+def area_vectors(places: Points, corners: Int[np.ndarray, "m 3"]) -> Float[Array, "m 3"]:
     """Normals of faces, each as long as twice its area."""
     a, b, c = (places[corners[:, i]] for i in range(3))
     return jnp.cross(b - a, c - a)

@@ -8,9 +8,9 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
-from .._types import Points, Vector
+from .._types import Array, Points, Vector
 from ..errors import ParameterError
 
 
@@ -37,9 +37,13 @@ class AbstractMeasure(eqx.Module):
     def of(self, places: Points) -> Vector:
         """The numbers, from the places of the points that it reads; plain JAX."""
 
-    def under(self, places: Points, controls: Vector) -> Vector:
+    def under(self, places: Points, controls: Float[Array, "c"]) -> Vector:
         """The same, for a measure that reads the controls of the deformer too; few do."""
         return self.of(places)
+
+    def marks(self, places: Points) -> Points:
+        """Where pictures mark it, from the places of the points that it reads: these."""
+        return places
 
     def __call__(self, points: Points) -> Vector:
         """The numbers of a shape, from all its points."""

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
-from .._types import Points, Vector
+from .._types import Array, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Geometry
 from .base import AbstractMeasure
@@ -66,7 +66,7 @@ class EdgeRadius(AbstractMeasure):
             around = [Spot(*cut.foot(0.0, "upper"))]
             for side in ("upper", "lower"):
                 around += [Spot(*cut.foot(length * part, side)) for part in AROUND]
-        return cls(around, normal or span(geometry))
+        return cls(around, span(geometry) if normal is None else normal)
 
     @property
     @override
@@ -116,8 +116,8 @@ class Circularity(AbstractMeasure):
 
 
 def circle(
-    flat: Float[jnp.ndarray, "s 2"],
-) -> tuple[Float[jnp.ndarray, "2"], Float[jnp.ndarray, ""]]:
+    flat: Float[Array, "s 2"],
+) -> tuple[Float[Array, "2"], Float[Array, ""]]:
     """Centre and radius of the circle nearest to points of a plane."""
     middle = jnp.mean(flat, axis=0)
     own = flat - middle  # or the squares below cancel far from the origin

@@ -90,11 +90,12 @@ class Clearance(AbstractMeasure):
         kinds = [(1, 3), (1, 3), (2,), ()]
         shapes = [jax.ShapeDtypeStruct(shape, np.int32) for shape in kinds[:3]]
         shapes.append(jax.ShapeDtypeStruct((), np.float64))
-        pair = Pair(
-            *jax.pure_callback(
-                self._closest, shapes, jax.lax.stop_gradient(places), vmap_method="sequential"
-            )
-        )
+
+        def search(now: Array) -> list[np.ndarray]:
+            return self._closest(np.asarray(now))
+
+        still = jax.lax.stop_gradient(places)
+        pair = Pair(*jax.pure_callback(search, shapes, still, vmap_method="sequential"))
         one, other = places[pair.rows], jnp.asarray(self.other)[pair.other_rows]
         mine, its = pair.kinds
         ahead = jnp.ones(1)
@@ -105,8 +106,7 @@ class Clearance(AbstractMeasure):
         )
         return jnp.where(pair.sign == 0, 0.0, pair.sign * apart)
 
-    def _closest(self, places: Points) -> list[np.ndarray]:
-        places = np.asarray(places)
+    def _closest(self, places: Float[np.ndarray, "r 3"]) -> list[np.ndarray]:
         found = closest(places, self.corners, self.boxes)
         if found.distance > 0:
             return self._pair(found.faces, found.weights, 1.0)

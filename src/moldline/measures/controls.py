@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from typing_extensions import override
 
-from .._types import Points, Vector
+from .._types import Array, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Geometry
 from .base import AbstractMeasure
@@ -52,7 +52,7 @@ class Controls(AbstractMeasure):
         raise ParameterError("controls are not read from points; this measure is for a deformer")
 
     @override
-    def under(self, places: Points, controls: Vector) -> Vector:
+    def under(self, places: Points, controls: Float[Array, "c"]) -> Vector:
         if self.numbers.max() >= len(controls):
             raise ParameterError(
                 f"control {self.numbers.max()} is not there; the deformer has {len(controls)}, "

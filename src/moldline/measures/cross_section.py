@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from typing_extensions import override
 
-from .._types import Faces, Points, Scalar, Vector
+from .._types import Array, Faces, Points, Scalar, Vector
 from ..mesh import Geometry
 from .base import AbstractMeasure, as_rows
 from .directions import Along, Way, direction
@@ -62,7 +62,7 @@ class CrossSection(AbstractMeasure):
     def of(self, places: Points) -> Vector:
         return jnp.stack([self._area(places, at) for at in self.at])
 
-    def _area(self, places: Points, at: Scalar) -> Float[jnp.ndarray, ""]:
+    def _area(self, places: Points, at: Scalar) -> Float[Array, ""]:
         height = places @ self.along - at
         corners = [self.corners[:, i] for i in range(3)]
         total = jnp.zeros(())
@@ -80,11 +80,11 @@ class CrossSection(AbstractMeasure):
 
 def _crossing(
     places: Points,
-    height: Float[jnp.ndarray, "r"],
+    height: Float[Array, "r"],
     start: Int[np.ndarray, "m"],
     end: Int[np.ndarray, "m"],
-    crosses: Bool[jnp.ndarray, "m"],
-) -> Float[jnp.ndarray, "m 3"]:
+    crosses: Bool[Array, "m"],
+) -> Float[Array, "m 3"]:
     rise = jnp.where(crosses, height[start] - height[end], 1.0)
     share = (height[start] / rise)[:, None]
     return places[start] + share * (places[end] - places[start])

@@ -12,7 +12,7 @@ from typing_extensions import override
 from .._types import Faces, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Geometry
-from ..numerics.nearest import nearest
+from ..numerics.closest import nearest, tree
 from .base import AbstractMeasure, as_rows
 from .features import offset, ordered
 from .needs import faces_of
@@ -74,7 +74,9 @@ class Enclosed(AbstractMeasure):
         faces = faces_of(geometry, component, "what is enclosed")
         if (points is None) == (box is None):
             raise ParameterError("what is enclosed is said by points, or by a box")
-        return cls(faces, np.array(points)) if points else cls.box(faces, box or [], samples)
+        if points is not None:
+            return cls(faces, points)
+        return cls.box(faces, box or [], samples)
 
     @property
     @override
@@ -85,7 +87,7 @@ class Enclosed(AbstractMeasure):
     def of(self, places: Points) -> Vector:
         count = len(self.points)
         rows, kinds, side = jax.pure_callback(
-            self._found,
+            lambda now: self._found(np.asarray(now)),
             (
                 jax.ShapeDtypeStruct((count, 3), np.int32),
                 jax.ShapeDtypeStruct((count,), np.int32),
@@ -96,10 +98,9 @@ class Enclosed(AbstractMeasure):
         )
         return offset(jnp.asarray(self.points), places[rows], kinds, side)
 
-    def _found(self, places: Points) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _found(self, places: Float[np.ndarray, "r 3"]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Corners of the nearest faces, how many of them bear the nearest point, and its side."""
-        places = np.asarray(places)
-        found = nearest(self.points, places, self.corners)
+        found = nearest(self.points, tree(places, self.corners))
         rows, kinds = ordered(self.corners[found.faces], found.weights)
         sides = np.ones(len(rows))
         for number in np.flatnonzero(kinds < 3).tolist():

@@ -38,7 +38,7 @@ class Monotonicity(AbstractMeasure):
     ) -> "Monotonicity":
         """Of spots in a row; upwards by default."""
         row = picked(geometry, spots, None, "a row")
-        return cls(row, along or up(geometry))
+        return cls(row, up(geometry) if along is None else along)
 
     @property
     @override

@@ -62,7 +62,7 @@ class Opposed(AbstractMeasure):
         else:
             stations = at if isinstance(at, list) else [at]
             pairs = [chord_ends(geometry, y, component, "opposed motion") for y in stations]
-        return cls(geometry.points, pairs, along or up(geometry))
+        return cls(geometry.points, pairs, up(geometry) if along is None else along)
 
     @property
     @override

@@ -37,7 +37,7 @@ class Position(AbstractMeasure):
     @override
     def build(cls, geometry: Geometry, *, spot: Place, along: Way | None = None) -> "Position":
         """Of one spot; along x and y of a section."""
-        return cls(picked(geometry, spot), along or room(geometry))
+        return cls(picked(geometry, spot), room(geometry) if along is None else along)
 
     @property
     @override
@@ -48,6 +48,10 @@ class Position(AbstractMeasure):
     @override
     def is_affine(self) -> bool:
         return True
+
+    @override
+    def marks(self, places: Points) -> Points:
+        return self.matrix @ places
 
     @override
     def of(self, places: Points) -> Vector:

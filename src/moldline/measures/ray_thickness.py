@@ -91,7 +91,7 @@ class RayThickness(AbstractMeasure):
         lower, upper, chords = picks_over(geometry, chord, at, component)
         points = np.asarray(geometry.points)
         middles = [(a.of(points) + b.of(points)) / 2 for a, b in zip(lower, upper, strict=True)]
-        way = along or up(geometry)
+        way = up(geometry) if along is None else along
         cells = _cells(geometry, component)
         return cls(cells, np.array(middles), way, chords if relative else None)
 
@@ -116,7 +116,7 @@ class RayThickness(AbstractMeasure):
             return cls.over(geometry, chord, at, component, along, relative)
         if not origins or chord is not None or at is not None or relative:
             raise ParameterError("a ray's thickness is said by origins, or by chord and at")
-        return cls(_cells(geometry, component), origins, along or up(geometry))
+        return cls(_cells(geometry, component), origins, up(geometry) if along is None else along)
 
     @property
     @override

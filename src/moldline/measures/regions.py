@@ -70,7 +70,7 @@ class Fixed(AbstractMeasure):
     ) -> "Fixed":
         """Spots, the vertices of a region, or both; along x and y of a section."""
         found = picked(geometry, spots, region, "what is fixed")
-        return cls(geometry.points, (), found, along or room(geometry))
+        return cls(geometry.points, (), found, room(geometry) if along is None else along)
 
     @property
     @override

@@ -41,7 +41,9 @@ class Separation(AbstractMeasure):
         cls, geometry: Geometry, *, start: Place, end: Place, along: Way | None = None
     ) -> "Separation":
         """Of two spots; along x and y of a section."""
-        return cls(spot(geometry, start), spot(geometry, end), along or room(geometry))
+        return cls(
+            spot(geometry, start), spot(geometry, end), room(geometry) if along is None else along
+        )
 
     @property
     @override

@@ -68,7 +68,9 @@ class Thickness(AbstractMeasure):
     ) -> "Thickness":
         """Toothpicks at fractions of the chord, for each station y = `at` of a wing in turn."""
         lower, upper, chords = picks_over(geometry, chord, at, component)
-        return cls(lower, upper, along or up(geometry), chords if relative else None)
+        return cls(
+            lower, upper, up(geometry) if along is None else along, chords if relative else None
+        )
 
     @classmethod
     @override
@@ -93,7 +95,7 @@ class Thickness(AbstractMeasure):
         if lower is None or upper is None or chord is not None or at is not None or relative:
             raise ParameterError("a thickness is said by lower and upper spots, or by chord and at")
         low, high = ([spot(geometry, place) for place in places] for places in (lower, upper))
-        return cls(low, high, along or up(geometry))
+        return cls(low, high, up(geometry) if along is None else along)
 
     @property
     @override

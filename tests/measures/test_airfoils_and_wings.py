@@ -36,12 +36,15 @@ def published(data):
 def test_naca_0012_is_twelve_percent_thick_at_thirty_percent_chord(published):
     for cls in (M.Thickness, M.RayThickness):
         assert one(cls.build(published, chord=0.3), published) == pytest.approx(0.12, abs=1.5e-4)
-        relative = cls.build(published, chord=0.3, relative=True)
-        larger = published.moved(3 * published.points)
-        assert one(relative, larger) == pytest.approx(0.12, abs=1.5e-4)
         over = cls.over(published, [0.1, 0.5, 0.9])
         found = np.asarray(over(published.points))
         np.testing.assert_allclose(found, 2 * half(np.array([0.1, 0.5, 0.9])), rtol=0, atol=2e-4)
+    larger = published.moved(3 * published.points)
+    relative = M.Thickness.build(published, chord=0.3, relative=True)
+    assert one(relative, larger) == pytest.approx(0.12, abs=1.5e-4)
+    # a ray stays in space: what was 30 % of the chord is 10 % of the larger one
+    relative = M.RayThickness.build(published, chord=0.3, relative=True)
+    assert one(relative, larger) == pytest.approx(2 * half(0.1), abs=2e-4)
 
 
 def test_its_area_is_the_integral_of_the_published_thickness(published):
@@ -54,8 +57,8 @@ def test_its_area_is_the_integral_of_the_published_thickness(published):
 
 def test_its_nose_radius_is_that_of_report_460(published):
     known = 1.1019 * 0.12**2
-    # the circle through the first percent is larger, for the section grows flatter from the nose
-    assert one(M.EdgeRadius.build(published), published) == pytest.approx(known, rel=0.1)
+    # the circle is larger the more of the section it is fitted to, which grows flatter
+    assert one(M.EdgeRadius.build(published), published) == pytest.approx(known, rel=0.15)
     fine = naca0012(2000)
     narrow = M.EdgeRadius.build(fine, length=5e-4)
     assert one(narrow, fine) == pytest.approx(known, rel=0.03)
@@ -145,9 +148,11 @@ def test_its_planform_area_is_the_integral_of_its_chord(transport):
     assert 1.0 < 2 * shadow / (594720 * 0.0254**2) < 1.1
 
 
-def test_its_leading_edge_is_straight_from_the_break_outwards_only(transport):
+def test_its_leading_edge_is_straight_in_planform_from_the_break_outwards(transport):
     outer = M.Linearity.build(transport, at=[13.0, 17.0, 21.0, 25.0], component="1")
-    assert np.abs(outer(transport.points)).max() < 0.02
+    beside, above = np.asarray(outer(transport.points)).reshape(-1, 2).T
+    assert np.abs(beside).max() < 1e-3  # in planform; seen from ahead the wing is bent upwards
+    assert np.abs(above).max() > 0.1
     hinge = M.Linearity.build(transport, at=[5.0, 13.0, 25.0], chord=0.75, side="lower")
     assert np.abs(hinge(transport.points)).max() > 0.1
 
@@ -163,7 +168,7 @@ def test_a_spar_box_fits_between_spars_and_a_taller_one_does_not(transport):
             ends[x, y] = (low, high)
     for share, fits in ((0.25, True), (0.0, False)):
         corners = [
-            list((1 - w) * low + w * high)
+            tuple((1 - w) * low + w * high)
             for x in (0.2, 0.6)
             for y in (5.0, 15.0)
             for low, high in [ends[x, y]]

@@ -19,7 +19,10 @@ TOP = {"chord": 0.3, "side": "upper"}
 CAP = {"near": [0, 0, 1], "radius": 0.5}
 
 EXAMPLES = {
-    "position": [("ball", {"spot": {"near": [0.3, 0.5, 1.0]}, "along": "xz"}), ("foil", {"spot": TOP})],
+    "position": [
+        ("ball", {"spot": {"near": [0.3, 0.5, 1.0]}, "along": "xz"}),
+        ("foil", {"spot": TOP}),
+    ],
     "separation": [("ball", {"start": V[0], "end": V[1]}), ("foil", {"start": V[0], "end": TOP})],
     "distance": [("ball", {"start": V[0], "end": V[4]})],
     "thickness": [
@@ -79,7 +82,7 @@ EXAMPLES = {
     ],
     "section_area": [("foil", {})],
     "controls": [("ball", {"numbers": [0, 2]})],
-}  # fmt: skip
+}
 """Options of each, as a case file has them, and what they are for."""
 
 CASES = [
@@ -196,35 +199,115 @@ def test_what_reads_faces_needs_a_surface_with_the_component(name, shapes):
 
 
 WRONG = {
-    "position": [({"spot": {}}, "a place is one of"), ({"spot": V[0], "along": "w"}, "x, y and z"),
-                 ({"spot": {"vertex": 10**6}}, "is not there")],
-    "separation": [({"start": V[0], "end": {}}, "a place is one of"), ({"start": V[0], "end": V[1], "along": ""}, "x, y and z"),
-                   ({"start": {"near": (9e9, 0, 0)}, "end": V[0]}, "nothing is near")],
-    "distance": [({"start": V[0], "end": {}}, "a place is one of"), ({"start": {"vertex": -1}, "end": V[0]}, "not there"),
-                 ({"start": {"chord": 0.1}, "end": V[0]}, "needs its side")],
-    "thickness": [({}, "by lower and upper spots, or by chord and at"), ({"chord": 0.3}, "say at which y"),
-                  ({"lower": V[:1], "upper": V[:2]}, "as many upper as lower"), ({"lower": V[:1], "upper": V[:1], "relative": True}, "by lower")],
-    "ray_thickness": [({}, "by origins, or by chord and at"), ({"chord": 1.5, "at": 3.0}, "lies in 0 to 1"),
-                      ({"origins": [(0.0, 0.0, 0.0)], "relative": True}, "by origins")],
-    "incidence": [({"leading": V[0]}, "needs leading and trailing"), ({}, "say at which y"), ({"at": 50.0}, "no chord at y = 50")],
-    "opening": [({"apex": V[0]}, "needs apex, one and other"), ({"at": 3.0, "length": 2.0}, "between 0 and 1"), ({}, "say at which y")],
-    "edge_radius": [({"spots": V[:2]}, "three spots or more"), ({}, "say at which y"), ({"at": 3.0, "length": 2.0}, "lies in 0 to 1")],
-    "chord": [({}, "a chord of a wing needs"), ({"at": -3.0}, "no chord at y = -3"), ({"at": 3.0, "component": "fin"}, "no component named")],
-    "camber": [({}, "a camber of a wing needs"), ({"at": 3.0, "chord": -0.1}, "lies in 0 to 1"), ({"at": 33.0}, "no chord at y = 33")],
-    "projected_area": [({"along": "xy"}, "one direction"), ({"along": (0.0, 0.0, 0.0)}, "above zero"), ({"component": ""}, "no component")],
-    "cross_section": [({"at": 1.0, "along": "xy"}, "one direction"), ({"at": 1.0, "component": "fin"}, "no component"), ({"at": 1.0, "along": ""}, "one direction")],
-    "enclosed": [({}, "by points, or by a box"), ({"box": [(0.0, 0.0, 0.0)]}, "two opposite corners, or eight, got 1"),
-                 ({"box": [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)], "samples": 1}, "two samples"), ({"points": []}, "three coordinates each")],
-    "linearity": [({}, "by spots, or by stations"), ({"spots": V[:2]}, "three spots or more"), ({"spots": [V[0], V[1], V[0]]}, "in one place")],
-    "planarity": [({}, "needs spots, or a region"), ({"spots": V[:3]}, "four spots or more"), ({"region": {"vertices": [1, 2]}}, "four spots or more")],
-    "circularity": [({}, "needs spots, or a region"), ({"spots": V[:2]}, "three spots or more"), ({"spots": V, "normal": "zz"}, "one direction")],
-    "monotonicity": [({"spots": V[:1]}, "two spots or more"), ({"spots": V, "along": "xz"}, "one direction"), ({"spots": [{}, {}]}, "a place is one of")],
-    "symmetry": [({"tolerance": 1e-12, "across": "z"}, "no mirror image across z = 0"), ({}, "no mirror image across y = 0"), ({"region": {}}, "no mirror image")],
-    "rigid": [({"region": {"vertices": [1, 2]}}, "three points or more"), ({"region": {}}, "a region is said by"), ({"region": {"radius": 1.0}}, "both near and radius")],
-    "fixed": [({}, "needs spots, or a region"), ({"spots": []}, "one point or spot"), ({"region": {"vertices": [-1]}}, "not there")],
-    "opposed": [({}, "say at which y"), ({"start": V[0]}, "start and end, or of edges"), ({"at": [1.0, 99.0]}, "no chord at y = 99")],
+    "position": [
+        ({"spot": {}}, "a place is one of"),
+        ({"spot": V[0], "along": "w"}, "x, y and z"),
+        ({"spot": {"vertex": 10**6}}, "is not there"),
+    ],
+    "separation": [
+        ({"start": V[0], "end": {}}, "a place is one of"),
+        ({"start": V[0], "end": V[1], "along": ""}, "x, y and z"),
+        ({"start": {"near": (9e9, 0, 0)}, "end": V[0]}, "nothing is near"),
+    ],
+    "distance": [
+        ({"start": V[0], "end": {}}, "a place is one of"),
+        ({"start": {"vertex": -1}, "end": V[0]}, "not there"),
+        ({"start": {"chord": 0.1}, "end": V[0]}, "needs its side"),
+    ],
+    "thickness": [
+        ({}, "by lower and upper spots, or by chord and at"),
+        ({"chord": 0.3}, "say at which y"),
+        ({"lower": V[:1], "upper": V[:2]}, "as many upper as lower"),
+        ({"lower": V[:1], "upper": V[:1], "relative": True}, "by lower"),
+    ],
+    "ray_thickness": [
+        ({}, "by origins, or by chord and at"),
+        ({"chord": 1.5, "at": 3.0}, "lies in 0 to 1"),
+        ({"origins": [(0.0, 0.0, 0.0)], "relative": True}, "by origins"),
+    ],
+    "incidence": [
+        ({"leading": V[0]}, "needs leading and trailing"),
+        ({}, "say at which y"),
+        ({"at": 50.0}, "no chord at y = 50"),
+    ],
+    "opening": [
+        ({"apex": V[0]}, "needs apex, one and other"),
+        ({"at": 3.0, "length": 2.0}, "between 0 and 1"),
+        ({}, "say at which y"),
+    ],
+    "edge_radius": [
+        ({"spots": V[:2]}, "three spots or more"),
+        ({}, "say at which y"),
+        ({"at": 3.0, "length": 2.0}, "lies in 0 to 1"),
+    ],
+    "chord": [
+        ({}, "a chord of a wing needs"),
+        ({"at": -3.0}, "no chord at y = -3"),
+        ({"at": 3.0, "component": "fin"}, "no component named"),
+    ],
+    "camber": [
+        ({}, "a camber of a wing needs"),
+        ({"at": 3.0, "chord": -0.1}, "lies in 0 to 1"),
+        ({"at": 33.0}, "no chord at y = 33"),
+    ],
+    "projected_area": [
+        ({"along": "xy"}, "one direction"),
+        ({"along": (0.0, 0.0, 0.0)}, "above zero"),
+        ({"component": ""}, "no component"),
+    ],
+    "cross_section": [
+        ({"at": 1.0, "along": "xy"}, "one direction"),
+        ({"at": 1.0, "component": "fin"}, "no component"),
+        ({"at": 1.0, "along": ""}, "one direction"),
+    ],
+    "enclosed": [
+        ({}, "by points, or by a box"),
+        ({"box": [(0.0, 0.0, 0.0)]}, "two opposite corners, or eight, got 1"),
+        ({"box": [(0.0, 0.0, 0.0), (1.0, 1.0, 1.0)], "samples": 1}, "two samples"),
+        ({"points": []}, "three coordinates each"),
+    ],
+    "linearity": [
+        ({}, "by spots, or by stations"),
+        ({"spots": V[:2]}, "three spots or more"),
+        ({"spots": [V[0], V[1], V[0]]}, "in one place"),
+    ],
+    "planarity": [
+        ({}, "needs spots, or a region"),
+        ({"spots": V[:3]}, "four spots or more"),
+        ({"region": {"vertices": [1, 2]}}, "four spots or more"),
+    ],
+    "circularity": [
+        ({}, "needs spots, or a region"),
+        ({"spots": V[:2]}, "three spots or more"),
+        ({"spots": V, "normal": "zz"}, "one direction"),
+    ],
+    "monotonicity": [
+        ({"spots": V[:1]}, "two spots or more"),
+        ({"spots": V, "along": "xz"}, "one direction"),
+        ({"spots": [{}, {}]}, "a place is one of"),
+    ],
+    "symmetry": [
+        ({"tolerance": 1e-12, "across": "z"}, "no mirror image across z = 0"),
+        ({}, "no mirror image across y = 0"),
+        ({"region": {}}, "no mirror image"),
+    ],
+    "rigid": [
+        ({"region": {"vertices": [1, 2]}}, "three points or more"),
+        ({"region": {}}, "a region is said by"),
+        ({"region": {"radius": 1.0}}, "both near and radius"),
+    ],
+    "fixed": [
+        ({}, "needs spots, or a region"),
+        ({"spots": []}, "one point or spot"),
+        ({"region": {"vertices": [-1]}}, "not there"),
+    ],
+    "opposed": [
+        ({}, "say at which y"),
+        ({"start": V[0]}, "start and end, or of edges"),
+        ({"at": [1.0, 99.0]}, "no chord at y = 99"),
+    ],
     "section_area": [({}, "needs a section, got a surface")],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize(

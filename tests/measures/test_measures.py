@@ -2,38 +2,38 @@
 
 import math
 
+import jax
 import numpy as np
 import pytest
+from measures.simple import BOX, SIDES
+from wings import joined
 
 import moldline as ml
-from moldline.deformers.contract import prove
 from moldline.errors import ParameterError
 from moldline.measures.angle import Incidence, Opening
 from moldline.measures.area import Area, ProjectedArea
+from moldline.measures.bending_energy import BendingEnergy
 from moldline.measures.camber import Camber
 from moldline.measures.centroid import Centroid
+from moldline.measures.chord import Chord
 from moldline.measures.circularity import Circularity, EdgeRadius
 from moldline.measures.cross_section import CrossSection
+from moldline.measures.curvature import Curvature
+from moldline.measures.directions import direction
 from moldline.measures.distance import Distance
 from moldline.measures.monotonicity import Monotonicity
+from moldline.measures.opposed import Opposed
 from moldline.measures.position import Position
+from moldline.measures.ray_thickness import RayThickness
 from moldline.measures.regions import Fixed, Rigid, Symmetry
+from moldline.measures.section_area import SectionArea
 from moldline.measures.separation import Separation
-from moldline.measures.bending_energy import BendingEnergy
 from moldline.measures.spot import Spot
 from moldline.measures.straightness import Linearity, Planarity
-from moldline.measures.ray_thickness import RayThickness
 from moldline.measures.thickness import Thickness
 from moldline.measures.volume import Volume
 
 V = Spot.vertex
-
-BOX = np.array([[x, y, z] for x in (0, 4) for y in (0, 2) for z in (0, 1)], float)
-SIDES = np.array(
-    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-     [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
-)  # fmt: skip
-"""A box of 4 x 2 x 1, its faces looking outwards."""
 
 
 def numbers(measure, points=BOX):
@@ -186,31 +186,104 @@ def test_symmetry_pairs_points_and_refuses_those_without_partner(ball):
         Symmetry(points + np.array([0, 0.1, 0]), "y")
 
 
-MANY = [
-    lambda p, f: Incidence(V(3), V(400)),
-    lambda p, f: Opening(V(3), V(40), V(400)),
-    lambda p, f: Volume(f),
-    lambda p, f: Area(f),
-    lambda p, f: ProjectedArea(f, (1.0, 0.2, 0.3)),
-    lambda p, f: Centroid(f),
-    lambda p, f: CrossSection(f, "x", [0.0123, 0.31]),
-    lambda p, f: BendingEnergy(p, f),
-    lambda p, f: Distance(V(3), V(400)),
-    lambda p, f: Thickness([V(3)], [V(40)], "z", (V(5), V(60))),
-    lambda p, f: RayThickness(f, [[0.0123, 0.1231, 0]]),
-    lambda p, f: Circularity([V(i) for i in (1, 99, 200, 401)]),
-    lambda p, f: Planarity([V(i) for i in (1, 99, 200, 401)]),
-    lambda p, f: Rigid(p, range(0, 600, 53)),
-    lambda p, f: Camber(V(1), V(5), (V(99), V(200))),
-    lambda p, f: Separation(V(3), Spot.within([1, 2, 7], [0.2, 0.3, 0.5])),
-]
+def test_a_sphere_of_any_size_has_a_curvature_of_four_pi(ball):
+    measure = Curvature(np.asarray(ball.faces))
+    points = np.asarray(ball.points)
+    found = numbers(measure, 3 * points + 5)
+    assert found == pytest.approx([4 * math.pi], rel=4e-3)
+    assert numbers(measure, points * np.array([2.0, 1.0, 0.5])) > 1.2 * found
 
 
-@pytest.mark.parametrize("make", MANY)
-def test_derivatives_are_exact(make, ball):
-    rng = np.random.default_rng(1)
-    points = np.asarray(ball.points) + 0.005 * rng.normal(size=ball.points.shape)
-    prove(make(points, np.asarray(ball.faces)), points, 1e-3 * rng.normal(size=points.shape))
+def test_a_cylinder_has_the_curvature_of_a_cylinder_and_a_sheet_none():
+    """(1 / 2 r)2 times the area, 2 pi r h, but for its borders."""
+    around, along = 400, 21
+    angle, z = np.meshgrid(
+        np.arange(around) * 2 * np.pi / around, np.linspace(0, 1, along), indexing="ij"
+    )
+    loop = np.stack([2 * np.cos(angle), 2 * np.sin(angle), z], axis=-1)
+    surface = joined(loop.transpose(1, 0, 2))
+    found = numbers(Curvature(surface.faces), surface.points)
+    inner = (along - 2) / (along - 1)  # a border's points own a part of the area
+    assert found == pytest.approx([np.pi / (2 * 2) * inner], rel=2e-3)
+    flat = surface.points * np.array([1.0, 0.0, 1.0])
+    assert numbers(Curvature(surface.faces[: 2 * 100]), flat) == pytest.approx(0, abs=1e-20)
+
+
+def test_a_chord_is_the_distance_of_its_ends():
+    assert numbers(Chord(V(0), Spot.middle([V(4), V(6)]))) == pytest.approx([math.hypot(4, 1)])
+
+
+def test_opposed_edges_move_by_as_much_up_as_down():
+    measure = Opposed(BOX, [(V(0), V(4)), (V(1), V(5))])
+    moved = BOX + np.outer(2 - BOX[:, 0], [0, 0, 0.1])
+    assert numbers(measure, moved) == pytest.approx([0, 0], abs=1e-15)
+    moved[4, 2] += 0.3
+    assert numbers(measure, moved) == pytest.approx([0.3, 0], abs=1e-15)
+
+
+def test_a_loop_encloses_its_area():
+    square = np.array([[1, 1, 0], [3, 1, 0], [3, 2, 0], [1, 2, 0]], float) + 1e6
+    assert numbers(SectionArea(range(4)), square) == pytest.approx([2.0], rel=1e-12)
+    assert numbers(SectionArea(range(3, -1, -1)), square) == pytest.approx([-2.0], rel=1e-12)
+    angle = np.arange(1000) * 2 * np.pi / 1000
+    circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    exact = 500 * math.sin(2 * math.pi / 1000)
+    assert numbers(SectionArea(range(1000)), circle) == pytest.approx([exact], rel=1e-12)
+
+
+def test_rays_through_a_section_measure_what_lies_within():
+    square = ml.Section([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], is_closed=True)
+    for foil in (square, ml.Section(square.points[::-1], is_closed=True)):
+        up = RayThickness.build(foil, origins=[(0.3, 9.0, 0.0), (2.1, 0.0, 0.0), (1.9, 0.5, 0.0)])
+        assert numbers(up, foil.points) == pytest.approx([1.0, 0.0, 1.0])
+        ahead = RayThickness.build(foil, origins=[(0.3, 0.25, 0.0)], along="x")
+        assert numbers(ahead, foil.points) == pytest.approx([2.0])
+    with pytest.raises(ParameterError, match="run in its plane"):
+        RayThickness.build(square, origins=[(0.0, 0.0, 0.0)], along="z")
+
+
+@pytest.mark.parametrize("along", ["x", "y", "z", (1.0, 1.0, 0.0), (1.0, 1.0, 1.0)])
+def test_a_ray_through_edges_and_corners_of_the_mesh_counts_each_side_once(along, ball):
+    """Where it meets an edge, and where it meets a point."""
+    points = np.asarray(ball.points)
+    through = RayThickness(ball.faces, [[0.0, 0.0, 0.0]], along)
+    assert numbers(through, points) == pytest.approx([2.0], abs=0.01)
+    rng = np.random.default_rng(0)
+    edges = points[np.asarray(ball.faces)[rng.integers(0, 2000, 30), :2]]
+    on_edges, on_points = 0.9 * edges.mean(axis=1), 0.9 * edges[:, 0]
+    unit = direction(along)
+    for origins in (on_edges, on_points):
+        found = numbers(RayThickness(ball.faces, origins, along), points)
+        beside = np.linalg.norm(np.cross(origins, unit), axis=1)
+        assert found == pytest.approx(2 * np.sqrt(1 - beside**2), abs=0.03)
+
+
+def test_what_is_fixed_may_be_spots_and_may_slide():
+    spots = [Spot.within([0, 4], [0.5, 0.5])]
+    fixed = Fixed(BOX, [3], spots, "xz")
+    assert fixed.size == 4
+    moved = BOX + np.array([0.1, 5.0, 0.2])
+    assert numbers(fixed, moved) == pytest.approx([0.1, 0.2, 0.1, 0.2])
+
+
+def test_numbers_of_a_section_are_those_of_its_plane():
+    """Others never change, and no control could reach them."""
+    foil = ml.Section([[1, 0, 0], [0.5, 0.1, 0], [0, 0, 0], [0.5, -0.1, 0]], is_closed=True)
+    rng = np.random.default_rng(0)
+    for measure in (
+        Rigid.build(foil, region={"vertices": [0, 1, 2, 3]}),
+        Symmetry.build(foil),
+        Fixed.build(foil, region={"vertices": [0, 1]}),
+        Linearity.build(foil, spots=[{"vertex": 0}, {"vertex": 1}, {"vertex": 2}]),
+        Position.build(foil, spot={"vertex": 1}),
+        Separation.build(foil, start={"vertex": 1}, end={"vertex": 3}),
+    ):
+        slopes = np.asarray(jax.jacfwd(measure)(foil.points + 1e-3 * rng.normal(size=(4, 3))))
+        assert np.abs(slopes).reshape(measure.size, -1).max(axis=1).min() > 0.1
+    assert Rigid.build(foil, region={"vertices": [0, 1, 2, 3]}).size == 5
+    assert Symmetry.build(foil).size == 2 + 1 + 1
+    with pytest.raises(ParameterError, match="a section is flat"):
+        Planarity.build(foil, region={"vertices": [0, 1, 2, 3]})
 
 
 def test_what_cannot_be_measured_is_refused():

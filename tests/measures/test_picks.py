@@ -1,4 +1,4 @@
-"""Spots and regions: by number, by coordinates, by chord and side, in a box, a ball, a component."""
+"""Spots and regions: by number, coordinates, chord and side, in a box, a ball, a component."""
 
 import numpy as np
 import pytest

@@ -52,7 +52,7 @@ class EdgeRadius(AbstractMeasure):
         spots: list[Place] | None = None,
         at: float | None = None,
         component: str | None = None,
-        length: float = 0.01,
+        length: float = 0.002,
         normal: Way | None = None,
     ) -> "EdgeRadius":
         """Of spots, or of the leading edge of a wing at the station y = `at`, or of a section.

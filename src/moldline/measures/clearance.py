@@ -58,7 +58,9 @@ class Clearance(AbstractMeasure):
     other_corners: Int[np.ndarray, "t 3"]
     boxes: Tree
 
-    def __init__(self, faces: Faces, other_points: Points, other_faces: Faces):
+    def __init__(
+        self, faces: Faces, other_points: Float[Array, "p 3"], other_faces: Int[Array, "t 3"]
+    ):
         self.reads, self.corners = as_rows(np.asarray(faces))
         self.other = np.asarray(other_points, float)
         self.other_corners = np.asarray(other_faces)

@@ -1,6 +1,6 @@
 """A wing skeleton: span, chord, sweep, dihedral and twist as controls."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
 import equinox as eqx
@@ -272,7 +272,7 @@ class WingSkeleton(AbstractPosed):
         ]
         return self.net.carried(jnp.stack(shifts, axis=1), slopes)
 
-    def _mapped(self, given: dict[str, Array]) -> Float[Array, "s 3 2"]:
+    def _mapped(self, given: Mapping[str, Array]) -> Float[Array, "s 3 2"]:
         """The stations' maps of their sections, less one: displacements are zero at rest."""
         turn, growth = given["twist"], given["chord"] / self.net.scales
         along = growth * jnp.cos(turn) - 2 * jnp.sin(turn / 2) ** 2

@@ -80,7 +80,8 @@ def measured(size: int, coordinates: str) -> table.Row:
     row |= {"x": row["deform"] / stream, "VJP x": row["VJP"] / stream}
     if coordinates == "harmonic":
         if size <= BLENDER_MOST:
-            row |= blender(points, cage, controls, np.asarray(binding(controls)), row["deform"])
+            theirs = blender(points, cage, controls, PRECISION)
+            row |= _compared(theirs, controls, np.asarray(binding(controls)), row["deform"])
         if size in PAPER:
             row["paper embed"], row["paper"] = PAPER[size]
     return row
@@ -107,27 +108,32 @@ def points_inside(size: int) -> np.ndarray:
     return surface_points(size) * [0.45, 0.09, 0.15]
 
 
-def blender(
-    points: np.ndarray, cage: Any, controls: np.ndarray, ours: np.ndarray, deform: float
-) -> table.Row:
-    """Blender's times, and how far its points are from ours, in the largest motion."""
+def blender(points: np.ndarray, cage: Any, controls: np.ndarray, precision: int) -> Any:
+    """What Blender makes of the same and how long it takes; None where it is not there."""
     if not BLENDER.exists():
-        return {}
+        return None
     script = Path(__file__).parent / "blender_cage.py"
     with tempfile.TemporaryDirectory() as folder:
         given, result = Path(folder) / "in.npz", Path(folder) / "out.npz"
         moved = cage.rest + controls.reshape(-1, 3)
         np.savez(
             given, points=points, rest=cage.rest, moved=moved, faces=cage.shape.faces,
-            precision=PRECISION,
+            precision=precision,
         )  # fmt: skip
         done = subprocess.run(
             [BLENDER, script, given, result], capture_output=True, text=True, timeout=600
         )
         if done.returncode:
             print((done.stdout + done.stderr)[-500:], file=sys.stderr)
-            return {}
-        found = np.load(result)
+            return None
+        with np.load(result) as found:
+            return dict(found)
+
+
+def _compared(found: Any, controls: np.ndarray, ours: np.ndarray, deform: float) -> table.Row:
+    """Blender's times, and how far its points are from ours, in the largest motion."""
+    if found is None:
+        return {}
     wall = float(np.median(found["seconds"]))
     return {
         "Blender bind": float(found["bind"]), "Blender": 1e3 * wall,

@@ -99,6 +99,57 @@ def test_polygons_are_cut_the_same_way_every_time():
     assert len(ml.Cage(prism, sides + hexagons).shape.faces) == 12 + 8
 
 
+def test_polygons_of_a_file_make_the_cage_that_they_make_in_python(tmp_path):
+    """An L whose caps are no fans from their first corner."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], float)
+    points = np.concatenate([np.c_[outline, np.full(6, z)] for z in (0.0, 1.0)])
+    cap = [1, 2, 3, 4, 5, 0]
+    faces = [cap[::-1], [i + 6 for i in cap]]
+    faces += [[i, (i + 1) % 6, (i + 1) % 6 + 6, i + 6] for i in range(6)]
+    lines = [f"v {x} {y} {z}" for x, y, z in points.tolist()]
+    lines += ["f " + " ".join(str(i + 1) for i in face) for face in faces]
+    (tmp_path / "cage.obj").write_text("\n".join(lines))
+    places = np.random.default_rng(0).uniform([0.1, 0.1, 0.1], [1.9, 0.9, 0.9], (50, 3))
+    one, other = ml.Cage.read(tmp_path / "cage.obj"), ml.Cage(points, faces)
+    moves = np.random.default_rng(1).normal(size=36)
+    for axis in range(3):  # an affine motion of each component
+        moves[axis::3] = points @ moves[:3]
+    np.testing.assert_allclose(one.bind(places)(moves), other.bind(places)(moves), atol=1e-12)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 2**31), st.integers(0, 4), st.sampled_from(KINDS))
+def test_hostile_cages_are_cages_or_refused(seed, changes, kind):
+    """Faces left out, doubled, turned or wrong; points moved together, far away or nowhere."""
+    rng = np.random.default_rng(seed)
+    points, faces = box((3, 3, 2), (1.0, 0.7, 0.4))
+    for change in rng.integers(0, 8, changes).tolist():
+        face, point = rng.integers(len(faces)), rng.integers(len(points))
+        if change == 0:
+            faces = np.delete(faces, face, axis=0)
+        elif change == 1:
+            faces = np.append(faces, faces[face : face + 1], axis=0)
+        elif change == 2:
+            faces[face] = faces[face, ::-1]
+        elif change == 3:
+            faces[face, rng.integers(3)] = rng.integers(-2, len(points) + 2)
+        elif change == 4:
+            points[point] = points[rng.integers(len(points))]
+        elif change == 5:
+            points[point] += rng.normal(size=3)
+        elif change == 6:
+            points[point] = rng.choice([np.nan, np.inf, 1e300, 0.0])
+        else:
+            points[point] *= 1e-9
+    places = np.array([[0.0, 0.3, 0.0], [0.1, 0.4, 0.05], [0.4, 0.6, -0.1]])
+    try:
+        cage = ml.Cage(points, faces, coordinates=kind, cells=8 if kind == "harmonic" else None)
+        moved = np.asarray(cage.bind(places)(np.tile([0.1, 0.2, 0.3], len(cage.rest))))
+    except (GeometryError, ParameterError):
+        return
+    np.testing.assert_allclose(moved, places + [0.1, 0.2, 0.3], rtol=0, atol=1e-6)
+
+
 def test_a_cage_inside_out_is_turned(places):
     turned_over = ml.Cage(POINTS, FACES[:, ::-1], cells=10)
     controls = np.random.default_rng(0).normal(size=turned_over.size)

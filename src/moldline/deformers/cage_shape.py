@@ -18,6 +18,9 @@ from ..numerics.winding import winding
 NAMED = 3
 """Places that an error names."""
 
+LARGEST = 1e50
+"""Coordinate of a cage: its fourth power is still a number."""
+
 MOST = 20_000
 """Points of a cage; more are a slip of the pen."""
 
@@ -40,8 +43,10 @@ def shaped(points: Any, faces: Sequence[Sequence[int]] | Array) -> Shape:
         Where it is open, not manifold, or runs through itself.
     """
     points = np.array(points, float)
-    if points.ndim != 2 or points.shape[1:] != (3,) or not np.isfinite(points).all():
-        raise GeometryError("a cage's points must be finite, of shape (m, 3)")
+    if points.ndim != 2 or points.shape[1:] != (3,) or not np.all(np.abs(points) < LARGEST):
+        raise GeometryError(
+            f"a cage's points must be finite, coordinates below {LARGEST:g}, of shape (m, 3)"
+        )
     if len(points) > MOST:
         raise GeometryError(f"a cage has {MOST} points at most, got {len(points)}; make it coarser")
     loops = [np.asarray(face) for face in faces]

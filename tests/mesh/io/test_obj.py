@@ -31,6 +31,19 @@ def test_polygons_become_fans(tmp_path):
     assert read(tmp_path, SQUARE + "f 1 2 3 4\n").faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
+@pytest.mark.parametrize("first", range(6))
+def test_a_polygon_that_is_not_convex_is_cut_inside_itself(tmp_path, first):
+    """An L, from any corner on; a fan leaves it from all but two."""
+    outline = np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]], float)
+    points = "".join(f"v {x} {y} 0\n" for x, y in outline)
+    loop = " ".join(str((first + i) % 6 + 1) for i in range(6))
+    faces = read(tmp_path, f"{points}f 1 2 3\nf {loop}\nf 1 2 3 4\n").faces
+    assert len(faces) == 1 + 4 + 2
+    a, b, c = (outline[faces[1:5, k]] for k in range(3))
+    areas = np.linalg.det(np.stack([b - a, c - a], axis=1)) / 2
+    assert areas.min() > 0 and areas.sum() == pytest.approx(3.0)
+
+
 @pytest.mark.parametrize("face", ["1/1/1 2/2/2 3/3/3", "1//1 2//1 3//1", "1/4 2/4 3/4", "-4 -3 -2"])
 def test_corners_are_written_in_many_ways(tmp_path, face):
     assert read(tmp_path, f"{SQUARE}vt 0 0\nvn 0 0 1\nf {face}\n").faces.tolist() == [[0, 1, 2]]

@@ -20,7 +20,7 @@ from ...errors import FileError
 from ..surface import Surface
 from . import text
 from .files import contents, replacing
-from .polygons import fans
+from .polygons import triangles
 
 NAME = "OBJ"
 SUFFIXES = (".obj",)
@@ -129,6 +129,6 @@ def _surface(
             f"{path}: line {line}: the face needs numbers of points from 1 to {len(points)}, or "
             "back from -1 to the first point"
         )
-    triangles, owner = fans(corners, sizes)
+    found, owner = triangles(points, corners, sizes)
     components = tuple(map(text.decoded, names))
-    return Surface(points, triangles, tags[owner], components or ("1",))
+    return Surface(points, found, tags[owner], components or ("1",))

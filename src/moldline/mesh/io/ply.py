@@ -24,7 +24,7 @@ from ..surface import Surface
 from . import text
 from .files import Bytes, loaded, replacing
 from .ply_tables import TYPES, Element, Property, Table, tables
-from .polygons import fans
+from .polygons import triangles
 
 NAME = "PLY"
 SUFFIXES = (".ply",)
@@ -75,7 +75,7 @@ def read(path: Path | str) -> Surface:
     if "face" not in found and "tristrips" in found:
         raise FileError(f"{path}: has triangle strips, expected faces; triangulate it first")
     points, point_data = _points(found["vertex"], path)
-    faces, face_data = _faces(found.get("face", NO_FACES), len(points), path)
+    faces, face_data = _faces(found.get("face", NO_FACES), points, path)
     tags, components = _components(face_data, header.components)
     return Surface(points, faces, tags, components, point_data, face_data)
 
@@ -185,7 +185,9 @@ def _points(table: Table, path: Path | str) -> tuple[np.ndarray, dict[str, np.nd
     return points, {name: table.column(name, path) for name in table.scalars if name not in "xyz"}
 
 
-def _faces(table: Table, count: int, path: Path | str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+def _faces(
+    table: Table, points: np.ndarray, path: Path | str
+) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Triangles, and data."""
     names = [name for name in _CORNERS if name in table.lists]
     if not names:
@@ -200,7 +202,8 @@ def _faces(table: Table, count: int, path: Path | str) -> tuple[np.ndarray, dict
     def place(corner: int) -> str:
         return f"face {np.searchsorted(np.cumsum(sizes), corner, side='right')}"
 
-    faces, owner = fans(text.indices(corners, count, path, place, base=0), sizes)
+    numbers = text.indices(corners, len(points), path, place, base=0)
+    faces, owner = triangles(points, numbers, sizes)
     return faces, {name: table.column(name, path)[owner] for name in table.scalars}
 
 

@@ -18,7 +18,7 @@ from ...errors import FileError
 from ..surface import Surface
 from . import vtkpieces
 from .files import contents, replacing
-from .polygons import fans
+from .polygons import triangles
 from .vtkxml import Document, data_array, opening
 
 NAME = "VTP"
@@ -78,12 +78,12 @@ def _piece(document: Document, piece: Element) -> Surface:
         )
     points = vtkpieces.coordinates(document, piece)
     corners, sizes = vtkpieces.cells(document, piece, "Polys", len(points), least=3)
-    triangles, owner = fans(corners, sizes)
+    faces, owner = triangles(points, corners, sizes)
     skipped = document.count(piece, "NumberOfVerts") + document.count(piece, "NumberOfLines")
     face_data = vtkpieces.data(document, piece, "CellData", skipped + len(sizes))
     return Surface(
         points,
-        triangles,
+        faces,
         point_data=vtkpieces.data(document, piece, "PointData", len(points)),
         face_data={name: data[skipped:][owner] for name, data in face_data.items()},
     )

@@ -22,7 +22,7 @@ from ..surface import Surface
 from ..volume import NODES_PER_CELL, Cells, VolumeMesh
 from . import text, trix, vtkpieces
 from .files import contents, replacing
-from .polygons import fans
+from .polygons import triangles
 from .vtkpieces import Piece
 from .vtkxml import Document, data_array, opening
 
@@ -176,7 +176,7 @@ def _chosen(grid: Piece, mask: np.ndarray) -> Cells:
 
 def _surface(grid: Piece, mask: np.ndarray, names: tuple[str, ...], path: Path | str) -> Surface:
     cells = _chosen(grid, mask)
-    faces, owner = fans(np.asarray(cells.nodes), np.diff(cells.starts))
+    faces, owner = triangles(grid.points, np.asarray(cells.nodes), np.diff(cells.starts))
     face_data = {name: data[mask][owner] for name, data in grid.cell_data.items()}
     tags, components = vtkpieces.components(face_data.pop("component", None), names, path)
     return Surface(grid.points, faces, tags, components, grid.point_data, face_data)

@@ -6,15 +6,21 @@ import numpy as np
 import pytest
 
 import moldline as ml
+from moldline.deformers.chain import Chain
 from moldline.deformers.contract import check, prove
 from moldline.deformers.pilots import Pilots
 from moldline.errors import ParameterError
-from moldline.measures.angle import Incidence
-from moldline.measures.distance import Distance
-from moldline.measures.position import Position
-from moldline.measures.separation import Separation
-from moldline.measures.spot import Spot
-from moldline.measures.volume import Volume
+from moldline.measures import (
+    Constraint,
+    Controls,
+    Distance,
+    Fixed,
+    Incidence,
+    Position,
+    Separation,
+    Spot,
+    Volume,
+)
 
 V = Spot.vertex
 
@@ -33,14 +39,14 @@ def lattice(body):
 def bent(body, lattice):
     """Nonlinear: a length and an angle, at constant volume."""
     pilots = {"length": Distance(V(0), V(3)), "tilt": Incidence(V(3), V(1))}
-    return Pilots(body.points, lattice, pilots, {"volume": Volume(body.faces)})
+    return Pilots(body, pilots, {"volume": Volume(body.faces)}, lattice)
 
 
 @pytest.fixture(scope="module")
 def moved(body, lattice):
     """Linear: two places, a thickness kept."""
     pilots = {"nose": Position(V(3), "z"), "top": Position(V(2), "xz")}
-    return Pilots(body.points, lattice, pilots, {"thick": Separation(V(5), V(2), "z")})
+    return Pilots(body, pilots, {"thick": Separation(V(5), V(2), "z")}, lattice)
 
 
 def test_linear_conditions_are_met_to_rounding_by_one_product(moved, body):
@@ -50,7 +56,9 @@ def test_linear_conditions_are_met_to_rounding_by_one_product(moved, body):
     assert points[3, 2] - rest[3, 2] == pytest.approx(0.1, abs=1e-14)
     assert points[2, [0, 2]] - rest[2, [0, 2]] == pytest.approx([-0.05, 0.2], abs=1e-14)
     assert points[2, 2] - points[5, 2] == pytest.approx(rest[2, 2] - rest[5, 2], abs=1e-14)
-    assert moved.response is not None
+    assert moved.is_linear
+    report = moved.report(change)
+    assert (report.status, report.iterations) == ("met", 1)
 
 
 def test_volume_length_and_angle_are_met_together(bent, body):
@@ -60,7 +68,8 @@ def test_volume_length_and_angle_are_met_together(bent, body):
         asked = np.asarray(measure(body.points)) if asked is None else asked
         assert np.asarray(measure(points)) == pytest.approx(asked, rel=1e-12)
     report = bent.report(change)
-    assert report.is_converged and report.unmet == () and report.iterations > 2
+    assert report.status == "met" and report.unmet == () and report.iterations > 2
+    assert 0.5 < report.curvature < 1
     assert bent.report(np.zeros(2)).iterations == 0
 
 
@@ -81,6 +90,13 @@ def test_the_answer_depends_on_what_is_asked_and_not_on_the_way(bent):
     once = np.asarray(bent.pose(jnp.array([0.4, 0.1])))
     bent.pose(jnp.array([-0.9, 0.3]))
     assert np.array_equal(np.asarray(bent.pose(jnp.array([0.4, 0.1]))), once)
+
+
+def test_shorter_steps_come_to_the_same_shape(bent, body, lattice):
+    slow = Pilots(body, bent.pilots, bent.constraints, lattice, step=0.8)
+    change = np.array([0.2, 0.05])
+    np.testing.assert_allclose(slow.pose(change), bent.pose(change), rtol=0, atol=1e-10)
+    assert slow.report(change).iterations > bent.report(change).iterations
 
 
 @pytest.mark.parametrize("which", ["moved", "bent"])
@@ -110,29 +126,146 @@ def test_pilots_behind_another_stage_hold_what_they_prescribe(bent, body):
     found = [float(np.asarray(measure(points))[0]) for measure in bent.measures]
     assert found == pytest.approx(asked, rel=1e-11)
     prove(lambda v: moved({"lift": v}), values["lift"], 0.05 * np.ones(coarse.size))
+    before, behind = case.steps(values)
+    rest = np.asarray(body.points)
+    np.testing.assert_allclose(behind.after(rest, before.after(rest, rest)), points, atol=1e-12)
+    report = bent.report(np.array(own.value), np.asarray(before.after(rest, rest)))
+    assert report.status == "met"
+
+
+def test_a_flow_mesh_rides_along(moved, body):
+    turn = ml.variable("turn", size=3, value=(0.1, 0.0, 0.2))
+    case = ml.Pipeline(body, [ml.Stage(moved, {turn: ml.links.controls(moved)})])
+    rider = case.embed(np.asarray(body.points)[5:9])
+    assert np.array_equal(np.asarray(rider.points()), np.asarray(case.points())[5:9])
+
+
+def test_pilots_may_hide_a_chain(body, lattice):
+    fine = ml.Lattice.around(body, (4, 3, 3), margin=0.1)
+    pilots = Pilots(body, [Position(V(3), "z"), Position(V(2), "z")], hidden=[fine, lattice])
+    assert isinstance(pilots.net, Chain)
+    change = np.array([0.1, -0.1])
+    points, rest = np.asarray(pilots.bind(body.points)(change)), np.asarray(body.points)
+    assert points[[3, 2], 2] - rest[[3, 2], 2] == pytest.approx(change, abs=1e-11)
+    assert pilots.report(change).status == "met"
+    few = rest[::41]
+    check(pilots.net, few)
+    prove(pilots.bind(few), change, np.array([0.05, 0.02]))
 
 
 def test_duplicates_are_dropped_and_conflicts_named(body, lattice):
     twice = {"one": Position(V(3), "z"), "two": Position(V(3), "z")}
-    pilots = Pilots(body.points, lattice, twice)
-    assert len(pilots.combinations) == 1
-    assert pilots.report(np.array([0.1, 0.1])).unmet == ()
+    pilots = Pilots(body, twice, hidden=lattice)
+    agreed = pilots.report(np.array([0.1, 0.1]))
+    assert (agreed.status, agreed.unmet, agreed.dependent) == ("met", (), ("two",))
     torn = pilots.report(np.array([0.1, 0.2]))
-    assert torn.unmet == ("one", "two")
+    assert (torn.status, torn.unmet) == ("least squares", ("one", "two"))
     assert torn.misses["one"] == pytest.approx([0.05])  # the least squares
+
+
+def test_curved_conditions_that_contradict_are_met_in_least_squares(body, lattice):
+    length = Distance(V(0), V(3))
+    kept = {"volume": Volume(body.faces), "rest": Constraint(length, 6.0, 6.0, weight=2.0)}
+    pilots = Pilots(body, {"length": length}, kept, lattice)
+    at = np.array([0.5])
+    report = pilots.report(at)
+    assert report.unmet == ("length", "rest") and abs(report.misses["volume"]) < 1e-12
+    # weights count squared: 1 : 4
+    assert report.misses["rest"] == pytest.approx([0.1])
+    assert report.misses["length"] == pytest.approx([-0.4])
+    prove(pilots.bind(body.points), at, np.array([0.05]))
+
+
+def test_pilots_in_one_cell_of_too_coarse_a_lattice_are_named(body):
+    coarse = ml.Lattice.around(body, (2, 2, 2), margin=0.3)
+    spots = {f"p{n}": Position(V(n), "z") for n in (0, 1, 2, 3, 4, 5, 20, 40, 60)}
+    report = Pilots(body, spots, hidden=coarse).report(0.1 * np.arange(9.0))
+    assert report.status == "least squares" and report.unmet and report.dependent
+    fine = Pilots(body, spots)
+    assert fine.report(0.1 * np.arange(9.0)).status == "met"
+    assert max(fine.net.shape) > 2
+
+
+def test_bounds_hold_and_let_go(body, lattice):
+    bounds = {
+        "keel": Constraint(Position(V(5), "z"), lower=-0.75, upper=-0.65),
+        "wide": Constraint(Distance(V(1), V(4)), lower=1.9),
+        "volume": Volume(body.faces),
+    }
+    pilots = Pilots(body, {"top": Position(V(2), "z")}, bounds, lattice)
+    bind = pilots.bind(body.points)
+    assert np.array_equal(bind(np.zeros(1)), body.points)
+    for change, active in ((0.02, ()), (-0.3, ("keel",)), (0.2, ("wide", "keel"))):
+        report = pilots.report(np.array([change]))
+        assert (report.status, report.active) == ("met", active)
+        keel = np.asarray(bind(np.array([change])))[5, 2]
+        assert -0.75 - 1e-12 <= keel <= -0.65 + 1e-12
+        prove(bind, np.array([change]), np.array([0.005]))
+    pushed = pilots.solver(np.array([0.2]))
+    assert np.all(np.asarray(pushed.multipliers)[pilots.conditions.is_bound] >= 0)
+
+
+def test_a_bound_that_does_not_hold_at_rest_is_met_by_the_nearest_shape(body, lattice):
+    tank = Constraint(Separation(V(5), V(2), "z"), lower=1.6)
+    pilots = Pilots(body, {"nose": Position(V(3), "z")}, {"tank": tank}, lattice)
+    points = np.asarray(pilots.bind(body.points)(np.zeros(1)))
+    assert points[2, 2] - points[5, 2] == pytest.approx(1.6, abs=1e-12)
+
+
+def test_bounds_that_contradict_are_told(body, lattice):
+    both = {
+        "up": Constraint(Position(V(2), "z"), lower=0.9),
+        "down": Constraint(Position(V(2), "z"), upper=0.8),
+    }
+    report = Pilots(body, [Position(V(3), "z")], both, lattice).report(np.array([0.1]))
+    assert report.unmet and report.status != "met"
+
+
+def test_a_measure_may_read_the_hidden_controls(body, lattice):
+    still = {"held": Controls([2, 5, 8])}
+    pilots = Pilots(body, {"top": Position(V(2), "z")}, still, lattice)
+    found = np.asarray(pilots.pose(np.array([0.1])))
+    assert found[[2, 5, 8]] == pytest.approx(0, abs=1e-15) and np.abs(found).max() > 0.01
+
+
+def test_a_fixed_region_stays(body):
+    tail = np.flatnonzero(np.asarray(body.points)[:, 0] < -2.8)
+    pilots = Pilots(body, [Position(V(0), "xz")], {"tail": Fixed(body.points, tail)})
+    moved = np.asarray(pilots.bind(body.points)(np.array([0.1, 0.2])))
+    np.testing.assert_allclose(moved[tail], np.asarray(body.points)[tail], rtol=0, atol=1e-12)
 
 
 def test_weights_say_which_controls_move(body, lattice):
     heavy = np.ones(lattice.size)
     heavy[: lattice.size // 2] = 1e6
-    pilots = Pilots(body.points, lattice, {"top": Position(V(2), "z")}, weights=heavy)
+    pilots = Pilots(body, {"top": Position(V(2), "z")}, hidden=lattice, weights=heavy)
     motion = np.abs(np.asarray(pilots.pose(jnp.array([0.1]))))
     assert motion[: lattice.size // 2].max() < 1e-3 * motion.max()
+
+
+def test_the_lattice_that_is_made_is_as_fine_as_the_pilots_are_near(body):
+    rest = np.asarray(body.points)
+    along = [int(np.abs(rest - [x, 0, 0.7 * np.sqrt(1 - x * x / 9)]).sum(1).argmin())
+             for x in np.linspace(-2.4, 2.4, 9)]  # fmt: skip
+    few = Pilots(body, [Position(V(n), "z") for n in along[::4]])
+    many = Pilots(body, [Position(V(n), "z") for n in along])
+    assert few.net.shape[0] < many.net.shape[0]
+    airfoil = ml.Section(rest[np.abs(rest[:, 2]) < 1e-9])
+    flat = Pilots(airfoil, [Position(V(1), "y")])
+    assert flat.net.shape[2] == 1
 
 
 def test_what_no_control_reaches_is_told(body):
     local = ml.Lattice.box((2.0, -1, -1), (4, 1, 1), (3, 2, 2))
     with pytest.raises(ParameterError, match="no control of the hidden deformer reaches 'tail'"):
-        Pilots(body.points, local, {"nose": Position(V(0), "z"), "tail": Position(V(3), "z")})
+        Pilots(body, {"nose": Position(V(0), "z"), "tail": Position(V(3), "z")}, hidden=local)
     with pytest.raises(ParameterError, match="give one at least"):
-        Pilots(body.points, local, {})
+        Pilots(body, {})
+    with pytest.raises(ParameterError, match="both named 'a'"):
+        Pilots(body, {"a": V(0)}, {"a": Volume(body.faces)})
+    with pytest.raises(ParameterError, match="up to 1, got 2"):
+        Pilots(body, {"a": V(0)}, step=2.0)
+    with pytest.raises(ParameterError, match="must be above zero"):
+        Pilots(body, {"a": V(0)}, hidden=local, weights=0.0)
+    with pytest.raises(ParameterError, match="margin is above zero"):
+        Pilots(body, {"a": V(0)}, margin=-1.0)

@@ -60,7 +60,7 @@ def test_points_that_ride_are_carried_too(family):
 
 
 def test_a_picture_shows_the_child_where_its_parent_takes_it(family):
-    _, (_, rest, moved) = nets(family, VALUES)
+    _, (_, rest, moved, _) = nets(family, VALUES)
     still = {**VALUES, "nose": np.zeros(3)}
     parent = family.stages[0]
     expected = parent.deformer.follow(rest.reshape(-1, 3), parent.controls(family.values(still)))

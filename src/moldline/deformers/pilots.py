@@ -1,6 +1,6 @@
 """Pilots: what a shape measures is prescribed, and a hidden deformer obeys."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -12,23 +12,39 @@ from typing_extensions import override
 
 from .._types import Array, Points, Vector
 from ..errors import ParameterError
-from ..measures.base import AbstractMeasure
-from ..numerics.least_norm import Solution, independent, least_norm
+from ..measures.base import AbstractMeasure, Constraint
+from ..measures.position import Position
+from ..measures.spot import Spot
+from ..mesh import Geometry
+from ..numerics.least_norm import Solution, least_norm
 from .base import AbstractDeformer
-from .net import AbstractControlNet
+from .chain import Chain
+from .conditions import Conditions, conditions
+from .hidden import automatic
 from .posed import AbstractPosed
+from .readings import Readings
+from .second_order import smallest_curvature
 
 TOLERANCE = 1e-12
 """Of the last step, relative to the motion."""
 
-ROUNDING = 1e-13
-"""A miss that takes a motion of less than this part of the shape's size is none."""
+SETTLED = 1e-9
+"""A last step up to this is one."""
 
 UNMET = 1e-9
 """A condition is unmet where its miss takes a motion of more than this part of the shape's size."""
 
-Measured = Callable[[Vector], Points]
-"""From controls of the hidden deformer to the places that one measure reads."""
+SHOWN = 12
+"""Points that a measure may read to be shown by its places."""
+
+AT_LIMIT = 1e-9
+"""A bound that holds with less force than this part of the largest is about to let go."""
+
+Pilot = AbstractMeasure | Spot
+"""A spot is prescribed in all three directions."""
+
+Kept = AbstractMeasure | Constraint
+"""A measure stays as it is at rest, a constraint within its bounds."""
 
 
 class PilotReport(NamedTuple):
@@ -36,93 +52,126 @@ class PilotReport(NamedTuple):
 
     Attributes
     ----------
+    status
+        "met"; "least squares" where conditions contradict each other and some are unmet;
+        "not converged"; "not smooth" where a small change of the pilots may take the shape
+        elsewhere, so that derivatives hold on one side only, or not at all.
     misses
-        What each measure is off by, by its name, in its own unit.
+        What each measure is off by, by its name, in its own unit; of bounds how far beyond.
     unmet
         Names of those that are off by more than rounding.
+    active
+        Names of those that a bound holds.
+    dependent
+        Names of conditions that others imply, or contradict.
     iterations
-        Steps that the solver took; none where all is linear and at rest.
-    is_converged
-        Whether the last step was small.
+        Steps that the solver took; none at rest, one where all is linear.
+    curvature
+        How much the cost grows at least, per cost of a motion that keeps all conditions: 1 where
+        they are linear, 0 or less where the shape is not the one of least cost nearby.
     """
 
+    status: str
     misses: dict[str, np.ndarray]
     unmet: tuple[str, ...]
+    active: tuple[str, ...]
+    dependent: tuple[str, ...]
     iterations: int
-    is_converged: bool
+    curvature: float
 
 
 class Pilots(AbstractPosed):
     """Prescribe what a shape measures; a hidden deformer moves least to obey.
 
-    Of all controls of the hidden deformer that give the pilots what is asked of them, and leave
-    the constraints as they are at rest, those are taken whose weighted sum of squares is least.
-    Where conditions contradict each other they are met in the least squares, and the report says
-    which are not. Controls are changes of the pilots from what they measure at rest.
+    Of all controls of the hidden deformer that give the pilots what is asked of them, leave
+    measures among the constraints as they are at rest, and hold the others within their bounds,
+    those are taken whose weighted sum of squares is least. Conditions that contradict each other
+    are met in the least squares, and the report says which are not. Controls are changes of the
+    pilots from what they measure at rest.
 
     Attributes
     ----------
     net
         The hidden deformer, which moves the shape and any other points.
-    pilots, constraints
+    pilots
         Measures by name.
+    constraints
+        What is kept, by name; None where it is kept as it is at rest.
     rest
         Points of the shape at rest.
-    weights
-        What a change of each of the hidden deformer's controls costs.
-    scales
-        What motion of the hidden controls a change of each condition takes, inverted.
-    combinations
-        Independent combinations of the conditions in these scales.
+    measured
+        What pilots and constraints measure there.
     response
-        Where all is linear: hidden controls for each condition.
-    solver
-        From changes of the pilots to hidden controls, on the shape at rest.
+        Hidden controls for each number of the pilots, where all is linear.
+    is_linear
+        Whether the conditions are equations that change in proportion to the hidden controls.
+    step
+        The part of its miss that each of the solver's steps makes good, K in the source.
 
     Notes
     -----
-    Source: AIAA 2012-0965, equations 1 to 7.
+    Where bounds do not hold at rest the shape moves at once to the nearest one that keeps them, so
+    neutral controls do not leave it where it is. Where one begins to hold the motion has a kink.
+    Source: AIAA 2012-0965, equations 1 to 7; docs/theory/pilots.md derives it.
     """
 
     net: AbstractDeformer
     pilots: dict[str, AbstractMeasure]
-    constraints: dict[str, AbstractMeasure]
+    constraints: dict[str, Constraint | AbstractMeasure]
     rest: Points
-    wanted: Float[np.ndarray, "c"]
-    weights: Float[np.ndarray, "n"]
-    scales: Float[np.ndarray, "c"]
-    combinations: Float[np.ndarray, "r c"]
-    response: Float[np.ndarray, "n c"] | None
-    solver: Callable[[Vector], Array] = eqx.field(static=True)
+    measured: Float[np.ndarray, "c"]
+    response: Float[np.ndarray, "n k"] | None
+    is_linear: bool = eqx.field(static=True)
+    step: float = eqx.field(static=True)
+    conditions: Conditions = eqx.field(static=True)
+    readings: Readings = eqx.field(static=True)
+    solver: Callable[[Vector], Solution] = eqx.field(static=True)
 
     def __init__(
         self,
-        points: Points,
-        hidden: AbstractDeformer,
-        pilots: Mapping[str, AbstractMeasure],
-        constraints: Mapping[str, AbstractMeasure] | None = None,
+        geometry: Geometry,
+        points: Mapping[str, Pilot] | Sequence[Pilot],
+        constraints: Mapping[str, Kept] | Sequence[Kept] = (),
+        hidden: AbstractDeformer | Sequence[AbstractDeformer] | None = None,
+        *,
         weights: Any = 1.0,
+        step: float = 1.0,
+        margin: float = 0.1,
     ):
-        self.net, self.rest = hidden, np.asarray(points)
-        self.pilots, self.constraints = dict(pilots), dict(constraints or {})
-        if not self.pilots:
-            raise ParameterError("pilots are the variables: give one at least")
-        self.weights = np.broadcast_to(np.asarray(weights, float), hidden.size).copy()
-        if not np.all(np.isfinite(self.weights)) or np.any(self.weights <= 0):
+        self.rest = np.asarray(geometry.points)
+        self.pilots = {name: _measure(one) for name, one in _named(points, "pilot").items()}
+        self.constraints = _named(constraints, "constraint")
+        twice = self.pilots.keys() & self.constraints.keys()
+        if not self.pilots or twice:
+            raise ParameterError(
+                f"a pilot and a constraint are both named {min(twice)!r}"
+                if twice
+                else "pilots are the variables: give one at least"
+            )
+        if not 0 < step <= 1:
+            raise ParameterError(f"a step makes good a part of each miss, up to 1, got {step}")
+        self.step = step
+        self.net = automatic(self.rest, self.measures, margin) if hidden is None else _one(hidden)
+        costs = np.broadcast_to(np.asarray(weights, float), self.net.size).copy()
+        if not np.all(np.isfinite(costs)) or np.any(costs <= 0):
             raise ParameterError("weights of the hidden controls must be above zero")
-        values, slopes = _evaluated(self.measures, self._bound(), jnp.asarray(hidden.neutral))
-        self.wanted, slopes = np.asarray(values), np.asarray(slopes)
-        self.scales = _scales(self._labels, slopes, self.weights)
-        self.combinations = independent(slopes / self.scales[:, None], self.weights)
-        linear = isinstance(hidden, AbstractControlNet) and all(m.is_affine for m in self.measures)
-        self.response = _response(slopes / self.scales[:, None], self.weights) if linear else None
-        bound = self._bound()
-        self.solver = jax.jit(lambda controls: self._solved(bound, controls).x)
+        self.readings = Readings(self.net, self.measures, self._bound)
+        bounded = [c if isinstance(c, Constraint) else None for c in self.constraints.values()]
+        named = [*((n, None) for n in self.pilots), *zip(self.constraints, bounded, strict=True)]
+        extent = float(np.ptp(self.rest, axis=0).max())
+        self.measured, slopes = self.readings.at_rest()
+        counts = [measure.size for measure in self.measures]
+        self.conditions = conditions(named, counts, self.measured, slopes, costs, extent)
+        self.is_linear = all(self.readings.is_affine) and not len(self.conditions.bounds)
+        self.response = self.conditions.response(slopes)[:, : self.size] if self.is_linear else None
+        self.solver = jax.jit(lambda x: self._solved(self.readings, self.readings, x))
 
     @property
     def measures(self) -> list[AbstractMeasure]:
         """The pilots, and behind them the constraints."""
-        return [*self.pilots.values(), *self.constraints.values()]
+        kept = self.constraints.values()
+        behind = [one.measure if isinstance(one, Constraint) else one for one in kept]
+        return [*self.pilots.values(), *behind]
 
     @property
     @override
@@ -138,98 +187,103 @@ class Pilots(AbstractPosed):
     @property
     @override
     def values(self) -> Vector:
-        return self.wanted[: self.size]
+        return self.measured[: self.size]
 
     @override
     def pose(self, controls: Vector) -> Float[Array, "n"]:
-        if self.response is not None:
-            return self.response @ (self._change(controls) / self.scales)
-        return self.solver(jnp.asarray(controls))
+        return self._solution(jnp.asarray(controls)).x
 
     @override
     def settle(
         self, points: Points, controls: Vector
     ) -> tuple[AbstractDeformer, Float[Array, "m"]]:
         """The hidden deformer, and the controls that meet the conditions on the present shape."""
-        places = [points[measure.reads] for measure in self.measures]
-        follow = self.net.follow
-        measured: list[Measured] = [lambda x, p=p: follow(p, x) for p in places]  # type: ignore
-        return self.net, self._solved(measured, controls).x
+
+        def read(places: Points) -> Readings:
+            def moved(reads: np.ndarray) -> Callable[[Vector], Points]:
+                return lambda x: self.net.follow(places[reads], x)
+
+            return Readings(self.net, self.measures, moved)
+
+        points = jnp.asarray(points)
+        still = read(jax.lax.stop_gradient(points))
+        return self.net, self._solved(read(points), still, jnp.asarray(controls)).x
+
+    def marks(self, points: Points) -> Points:
+        """Where the places are that the pilots hold, for pictures."""
+        few = [m for m in self.pilots.values() if len(m.reads) <= SHOWN]
+        return jnp.concatenate([m.marks(jnp.asarray(points)[m.reads]) for m in few])
 
     def report(self, controls: Vector, points: Points | None = None) -> PilotReport:
         """How well the conditions are met, on the shape at rest or after earlier stages."""
-        shape = self.rest if points is None else points
-        solution = self._solved(self._bound(shape), jnp.asarray(controls))
-        values, _ = _evaluated(self.measures, self._bound(shape), solution.x)
-        misses = np.asarray(values - self.wanted - self._change(controls))
-        far = np.abs(misses / self.scales) > UNMET * np.ptp(self.rest, axis=0).max()
+        asked, readings, change = self.conditions, self.readings, jnp.asarray(controls)
+        if points is None:
+            solution = self._solution(change)
+        else:
+            readings = Readings(self.net, self.measures, lambda r: self.net.bind(points[r]))
+            solution = self._solved(readings, readings, change)
+        motion = solution.x - jnp.asarray(self.net.neutral)
+        scaled = np.zeros(len(asked.labels))
+        scaled[asked.equations], over = asked.slack(readings.values(motion), change)
+        np.maximum.at(scaled, asked.bounds, np.asarray(over))
+        is_active = np.asarray(solution.active)[asked.is_bound]
+        problem = asked.problem(readings, change)
+        curvature = 1.0 if self.is_linear else smallest_curvature(problem, motion, solution)
         names = [*self.pilots, *self.constraints]
         ends = np.cumsum([measure.size for measure in self.measures])[:-1]
-        parts, unmet = np.split(misses, ends), np.split(far, ends)
+        misses = dict(zip(names, np.split(scaled * asked.scales, ends), strict=True))
+        far = zip(names, np.split(np.abs(scaled) > UNMET * asked.size, ends), strict=True)
+        unmet = tuple(name for name, is_far in far if np.any(is_far))
         return PilotReport(
-            dict(zip(names, parts, strict=True)),
-            tuple(name for name, is_far in zip(names, unmet, strict=True) if np.any(is_far)),
+            self._status(solution, bool(unmet), curvature),
+            misses,
+            unmet,
+            tuple(dict.fromkeys(asked.labels[n] for n in asked.bounds[is_active])),
+            asked.dependent,
             int(solution.iterations),
-            bool(solution.size <= TOLERANCE) or not int(solution.iterations),
+            curvature,
         )
 
-    @property
-    def _labels(self) -> list[str]:
-        named = [*self.pilots.items(), *self.constraints.items()]
-        return [name for name, measure in named for _ in range(measure.size)]
+    def _status(self, solution: Solution, misses_some: bool, curvature: float) -> str:
+        if not float(solution.size) <= SETTLED:
+            return "not converged"
+        if misses_some:
+            return "least squares"
+        forces = np.abs(np.asarray(solution.multipliers))
+        held = self.conditions.is_bound & np.asarray(solution.active)
+        lets_go = held & (forces <= AT_LIMIT * forces.max(initial=0.0))
+        return "met" if curvature > 0 and not np.any(lets_go) else "not smooth"
 
-    def _bound(self, shape: Points | None = None) -> list[Measured]:
-        points = self.rest if shape is None else np.asarray(shape)
-        return [self.net.bind(points[measure.reads]) for measure in self.measures]
+    def _bound(self, reads: np.ndarray) -> Callable[[Vector], Points]:
+        return self.net.bind(self.rest[reads])
 
-    def _change(self, controls: Vector) -> Float[Array, "c"]:
-        kept = jnp.zeros(len(self.wanted) - self.size)
-        return jnp.concatenate([jnp.asarray(controls), kept])
+    def _solution(self, change: Float[Array, "p"]) -> Solution:
+        """On the shape at rest; one product where all is linear."""
+        if self.response is None:
+            return self.solver(change)
+        equations = np.zeros(len(self.conditions.is_bound))
+        steps = jnp.any(change != 0).astype(int)
+        x = jnp.asarray(self.net.neutral) + self.response @ change
+        return Solution(x, equations, equations == 0, steps, jnp.zeros(()))
 
-    def _solved(self, measured: list[Measured], controls: Vector) -> Solution:
+    def _solved(self, readings: Readings, still: Readings, change: Float[Array, "p"]) -> Solution:
         """The least controls of the hidden deformer, from its neutral ones."""
-        measures, neutral = self.measures, jnp.asarray(self.net.neutral)
-        combined = self.combinations / self.scales
-
-        def conditions(change: Vector) -> Float[Array, "r"]:
-            places = [points(neutral + change) for points in measured]
-            found = [m.of(p) for m, p in zip(measures, places, strict=True)]
-            return combined @ (jnp.concatenate(found) - self.wanted)
-
-        def slopes(change: Vector) -> tuple[Float[Array, "r"], Float[Array, "r n"]]:
-            values, rows = _evaluated(measures, measured, neutral + change)
-            return combined @ (values - self.wanted), combined @ rows
-
-        wanted = combined @ self._change(controls)
-        rounding = ROUNDING * float(np.ptp(self.rest, axis=0).max())
-        solution = least_norm(conditions, wanted, self.weights, TOLERANCE, rounding, slopes)
-        return solution._replace(x=neutral + solution.x)
+        problem = self.conditions.problem(readings, change)
+        held = self.conditions.problem(still, jax.lax.stop_gradient(change))
+        solution = least_norm(problem, held, TOLERANCE, self.step)
+        return solution._replace(x=jnp.asarray(self.net.neutral) + solution.x)
 
 
-def _evaluated(
-    measures: list[AbstractMeasure], measured: list[Measured], controls: Vector
-) -> tuple[Float[Array, "c"], Float[Array, "c n"]]:
-    """All numbers, and their slopes by the hidden controls: each by what it reads alone."""
-    values, rows = [], []
-    for measure, points in zip(measures, measured, strict=True):
-        value, pull = jax.vjp(lambda x, m=measure, p=points: m.of(p(x)), controls)
-        values.append(value)
-        rows.append(jax.vmap(lambda one, pull=pull: pull(one)[0])(jnp.eye(measure.size)))
-    return jnp.concatenate(values), jnp.concatenate(rows)
+def _named(given: Any, kind: str) -> dict[str, Any]:
+    """By name; those in a list are numbered."""
+    if isinstance(given, Mapping):
+        return dict(given)
+    return {f"{kind}{number}": one for number, one in enumerate(given)}
 
 
-def _scales(labels: list[str], slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    scales = np.sqrt(np.sum(slopes**2 / weights, axis=1))
-    lost = np.flatnonzero(scales <= 1e-12 * scales.max(initial=0.0))
-    if len(lost):
-        raise ParameterError(
-            f"no control of the hidden deformer reaches {labels[lost[0]]!r}; put it inside, or "
-            "leave it out"
-        )
-    return scales
+def _measure(pilot: Pilot) -> AbstractMeasure:
+    return Position(pilot) if isinstance(pilot, Spot) else pilot
 
 
-def _response(slopes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The pseudo-inverse: least change of the controls, least squares of the misses."""
-    root = np.sqrt(weights)
-    return np.linalg.pinv(slopes / root, rcond=1e-9) / root[:, None]
+def _one(hidden: AbstractDeformer | Sequence[AbstractDeformer]) -> AbstractDeformer:
+    return hidden if isinstance(hidden, AbstractDeformer) else Chain(hidden)

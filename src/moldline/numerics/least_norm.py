@@ -1,10 +1,12 @@
 """The smallest motion that meets some conditions, and its derivatives.
 
-Of all x with f(x) = wanted, the one that least(x) = x · (weights x) / 2. At it, with multipliers l,
+Of all x with f(x) = 0, or f(x) <= 0 where a condition is a bound, the one that least(x) =
+x · (weights x) / 2. At it, with multipliers l,
 
-    weights x + (f'(x))ᵀ l = 0,    f(x) = wanted,
+    weights x + (f'(x))ᵀ l = 0,    f(x) = 0,
 
-and it is these that are differentiated, with the curvature of f.
+(of bounds only those that are active, whose l is positive), and it is these equations that are
+differentiated, with the curvature of f. docs/theory/pilots.md derives it.
 """
 
 from collections.abc import Callable
@@ -13,26 +15,54 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from .._types import Array
-
-RANK = 1e-9
-"""Singular values below this part of the largest are those of dependent conditions."""
+from .bounded_dual import Multipliers, multipliers
 
 LIMIT = 60
-"""Steps."""
+"""Steps by linearised conditions."""
+
+POLISHED = 8
+"""Newton steps behind them, where they did not get there."""
+
+ACCURACY, MOST_TURNS = 1e-14, 100
+"""Of the solution of the linear equations, and the conjugate directions it may take."""
 
 HALVINGS = 25
 """Of a step that makes it no better."""
 
 Unknown = Float[Array, "n"]
-Misses = Float[Array, "r"]
+Misses = Float[Array, "k"]
 Both = Float[Array, "both"]
 Conditions = Callable[[Unknown], Misses]
 
-Slopes = Callable[[Unknown], tuple[Misses, Float[Array, "r n"]]]
+Slopes = Callable[[Unknown], tuple[Misses, Float[Array, "k n"]]]
 """Values and slopes of conditions."""
+
+
+class Problem(NamedTuple):
+    """What is asked of the smallest motion.
+
+    Attributes
+    ----------
+    missing
+        By how much conditions are missed: zero is asked, of bounds zero or less.
+    evaluated
+        The same with its slopes, by the fastest way there is.
+    weights
+        Cost of each unknown.
+    is_bound
+        Which conditions are bounds.
+    rounding
+        A miss that is none.
+    """
+
+    missing: Conditions
+    evaluated: Slopes
+    weights: Unknown
+    is_bound: Bool[np.ndarray, "k"]
+    rounding: float
 
 
 class Solution(NamedTuple):
@@ -42,6 +72,10 @@ class Solution(NamedTuple):
     ----------
     x
         The smallest motion.
+    multipliers
+        Of the conditions: what one more unit of each would cost.
+    active
+        Which conditions hold as equations.
     iterations
         Steps taken.
     size
@@ -49,116 +83,131 @@ class Solution(NamedTuple):
     """
 
     x: Float[Array, "n"]
+    multipliers: Misses
+    active: Bool[Array, "k"]
     iterations: Int[Array, ""]
     size: Float[Array, ""]
 
 
-def independent(slopes: Float[np.ndarray, "k n"], weights: Float[np.ndarray, "n"]) -> np.ndarray:
-    """Combinations (r, k) of conditions that are independent; as many as there are, themselves."""
-    left, sizes, _ = np.linalg.svd(slopes / np.sqrt(weights), full_matrices=False)
-    rank = int(np.sum(sizes > RANK * sizes.max(initial=0.0)))
-    return np.eye(len(slopes)) if rank == len(slopes) else left[:, :rank].T
-
-
 def least_norm(
-    conditions: Conditions,
-    wanted: Misses,
-    weights: Unknown,
-    tolerance: float,
-    rounding: float,
-    slopes: Slopes | None = None,
-    damping: Misses | float = 1.0,
+    problem: Problem, still: Problem, tolerance: float, damping: Misses | float = 1.0
 ) -> Solution:
     """Solve from zero for independent conditions; x is differentiable in all that they close over.
 
-    Newton's method, each step to the least x of the linearised conditions (a Gauss-Newton step in
-    its curvature), halved until the conditions' misses and the length together get less.
-    It ends where a step is below `tolerance`, relative to x, and at once where zero misses by no
-    more than `rounding`. `slopes` gives values and slopes where there is a faster way than one
-    reverse derivative of all conditions for each; `damping` is the part of each miss that a step
-    makes good.
+    Each step goes to the least x of the linearised conditions, halved until their misses and the
+    length together get less. It ends where a step is below `tolerance`, relative to x, and at once
+    where zero misses nothing. Where such steps converge too slowly, Newton's on the equations above
+    follow. `still` is the same problem, closed over what is not differentiated: the search needs no
+    derivatives. `damping` is the part of each miss that a step makes good.
     """
-    known = slopes or (lambda x: (conditions(x), jax.jacrev(conditions)(x)))
-
-    def missing(x: Unknown) -> Misses:
-        return conditions(x) - wanted
-
-    def evaluated(x: Unknown) -> tuple[Misses, Float[Array, "r n"]]:
-        values, rows = known(x)
-        return values - wanted, rows
-
-    found = _search(missing, evaluated, weights, tolerance, rounding, damping)
-    x = _differentiable(missing, evaluated, weights, found.x)
-    return Solution(x, found.iterations, found.size)
+    found = _polished(still, _search(still, tolerance, damping), tolerance)
+    return found._replace(x=_differentiable(problem, still, found))
 
 
-def _search(
-    missing: Conditions,
-    evaluated: Slopes,
-    weights: Unknown,
-    tolerance: float,
-    rounding: float,
-    damping: Misses | float,
-) -> Solution:
-    def target(x: Unknown) -> tuple[Unknown, Misses]:
+def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solution:
+    weights, is_bound = problem.weights, problem.is_bound
+
+    def target(x: Unknown) -> tuple[Unknown, Multipliers]:
         """Of the linearised conditions the least x, and its multipliers."""
-        miss, slopes = evaluated(x)
+        miss, slopes = problem.evaluated(x)
         spread = slopes / weights
-        multipliers = jnp.linalg.solve(spread @ slopes.T, damping * miss - slopes @ x)
-        return -(multipliers @ spread), multipliers
+        matrix, away = spread @ slopes.T, damping * miss - slopes @ x
+        if is_bound.any():
+            found = multipliers(matrix, away, is_bound, problem.rounding)
+        else:
+            found = Multipliers(jnp.linalg.solve(matrix, away), jnp.asarray(~is_bound))
+        return -(found.values @ spread), found
 
     def merit(x: Unknown, price: Float[Array, ""]) -> Float[Array, ""]:
-        return 0.5 * x @ (weights * x) + price * jnp.sum(jnp.abs(missing(x)))
+        return 0.5 * x @ (weights * x) + price * jnp.sum(_violation(problem, problem.missing(x)))
 
-    def step(state: tuple[Array, ...]) -> tuple[Array, ...]:
-        x, count, _ = state
-        aim, multipliers = target(x)
-        price = 2 * jnp.max(jnp.abs(multipliers)) + 1e-300
+    def step(state: Solution) -> Solution:
+        x = state.x
+        aim, found = target(x)
+        price = 2 * jnp.max(jnp.abs(found.values)) + 1e-300
         before = merit(x, price)
 
         def worse(trial: tuple[Array, Array]) -> Array:
             length, halvings = trial
             after = merit(x + length * (aim - x), price)
-            return (after > before * (1 + 1e-12)) & (halvings < HALVINGS)
+            return ~(after <= before * (1 + 1e-12)) & (halvings < HALVINGS)
 
         whole = (jnp.ones(()), jnp.zeros((), int))
         length, _ = jax.lax.while_loop(worse, lambda t: (t[0] / 2, t[1] + 1), whole)
         new = x + length * (aim - x)
         size = jnp.max(jnp.abs(new - x)) / (jnp.max(jnp.abs(new)) + 1e-300)
-        return new, count + 1, size
+        return Solution(new, found.values, found.active, state.iterations + 1, size)
 
-    def unfinished(state: tuple[Array, ...]) -> Array:
-        _, count, size = state
-        return (count < LIMIT) & (size > tolerance)
+    def unfinished(state: Solution) -> Array:
+        return (state.iterations < LIMIT) & ~(state.size <= tolerance)
 
     start = jnp.zeros(weights.shape)
-    begun = jnp.where(jnp.max(jnp.abs(missing(start))) > rounding, jnp.inf, 0.0)
-    state: tuple[Array, ...] = (start, jnp.zeros((), int), begun)
-    return Solution(*jax.lax.while_loop(unfinished, step, state))
+    missed = jnp.max(_violation(problem, problem.missing(start)))
+    begun = jnp.where(missed > problem.rounding, jnp.inf, 0.0)
+    none = jnp.zeros(len(is_bound))
+    state = Solution(start, none, jnp.asarray(~is_bound), jnp.zeros((), int), begun)
+    return jax.lax.while_loop(unfinished, step, state)
 
 
-def _differentiable(
-    missing: Conditions, evaluated: Slopes, weights: Unknown, found: Unknown
-) -> Unknown:
-    """The solution with the derivatives of the conditions that it meets."""
-    count = len(weights)
+def _violation(problem: Problem, miss: Misses) -> Misses:
+    return jnp.where(problem.is_bound, jnp.maximum(miss, 0.0), jnp.abs(miss))
 
-    def balance(unknown: Both) -> Both:
-        x, multipliers = unknown[:count], unknown[count:]
-        miss, pull = jax.vjp(missing, x)
-        return jnp.concatenate([weights * x + pull(multipliers)[0], miss])
 
-    x = jax.lax.stop_gradient(found)
-    slopes = jax.lax.stop_gradient(evaluated(x)[1])
+def _balance(problem: Problem, active: Bool[Array, "k"], unknown: Both) -> Both:
+    """The equations of the solution, by x and its multipliers; those of bounds that rest are 0."""
+    count = len(problem.weights)
+    x, forces = unknown[:count], unknown[count:]
+    miss, pull = jax.vjp(problem.missing, x)
+    along = problem.weights * x + pull(jnp.where(active, forces, 0.0))[0]
+    return jnp.concatenate([along, jnp.where(active, miss, forces)])
+
+
+def _flat(problem: Problem, active: Bool[Array, "k"], x: Unknown) -> Callable[[Both], Both]:
+    """The inverse of the equations' slopes where the conditions have no curvature."""
+    count, weights = len(problem.weights), problem.weights
+    slopes = jnp.where(active[:, None], problem.evaluated(x)[1], 0.0)
     spread = slopes / weights
-    small = spread @ slopes.T
-    multipliers = jnp.linalg.solve(small, -(slopes @ x))
+    small = spread @ slopes.T + jnp.diag(jnp.where(active, 0.0, 1.0))
 
-    def flat(vector: Both) -> Both:
-        """The inverse where the conditions have no curvature."""
+    def inverse(vector: Both) -> Both:
         one, other = vector[:count], vector[count:]
-        inner = jnp.linalg.solve(small, spread @ one - other)
+        right = jnp.where(active, spread @ one - other, other)
+        inner = jnp.linalg.solve(small, right)
         return jnp.concatenate([(one - slopes.T @ inner) / weights, inner])
+
+    return inverse
+
+
+def _polished(problem: Problem, found: Solution, tolerance: float) -> Solution:
+    """Newton's steps, while they make it better."""
+    count = len(problem.weights)
+
+    def step(state: tuple[Solution, jax.Array]) -> tuple[Solution, jax.Array]:
+        now, _ = state
+        unknown = jnp.concatenate([now.x, now.multipliers])
+
+        def balance(u: Both) -> Both:
+            return _balance(problem, now.active, u)
+
+        value, push = jax.linearize(balance, unknown)
+        new = unknown - _refined(push, _flat(problem, now.active, now.x), value)
+        size = jnp.max(jnp.abs(new - unknown)[:count]) / (jnp.max(jnp.abs(new[:count])) + 1e-300)
+        is_better = jnp.linalg.norm(balance(new)) < jnp.linalg.norm(value)
+        kept = jnp.where(is_better, new, unknown)
+        steps = now.iterations + 1
+        return Solution(kept[:count], kept[count:], now.active, steps, size), is_better
+
+    def unfinished(state: tuple[Solution, jax.Array]) -> Array:
+        now, is_better = state
+        return (now.iterations < LIMIT + POLISHED) & ~(now.size <= tolerance) & is_better
+
+    return jax.lax.while_loop(unfinished, step, (found, jnp.ones((), bool)))[0]
+
+
+def _differentiable(problem: Problem, still: Problem, found: Solution) -> Unknown:
+    """The solution with the derivatives of the equations that it meets."""
+    x, forces, active = found.x, found.multipliers, found.active
+    flat = _flat(still, active, x)
 
     def solve(matvec: Callable[[Both], Both], right: Both) -> Both:
         return _refined(matvec, flat, right)
@@ -166,14 +215,21 @@ def _differentiable(
     def tangent(linear: Callable[[Both], Both], right: Both) -> Both:
         return jax.lax.custom_linear_solve(linear, right, solve, symmetric=True)
 
-    unknown = jnp.concatenate([x, multipliers])
+    def balance(unknown: Both) -> Both:
+        return _balance(problem, active, unknown)
+
+    unknown = jnp.concatenate([x, forces])
     root = jax.lax.custom_root(balance, unknown, lambda _, guess: guess, tangent)
-    return root[:count]
+    return root[: len(x)]
 
 
 def _refined(matvec: Callable[[Both], Both], flat: Callable[[Both], Both], right: Both) -> Both:
-    """Solve by GMRES, begun and preconditioned by the flat inverse."""
-    solution, _ = jax.scipy.sparse.linalg.gmres(
-        matvec, right, x0=flat(right), M=flat, tol=1e-13, atol=0.0, restart=30, maxiter=10
+    """Solve by conjugate gradients, begun and preconditioned by the flat inverse.
+
+    It keeps them among the motions that the conditions leave free, where the equations are positive
+    definite: Gould, Hribar and Nocedal, SIAM J. Sci. Comput. 23, 2001.
+    """
+    solution, _ = jax.scipy.sparse.linalg.cg(
+        matvec, right, x0=flat(right), M=flat, tol=ACCURACY, atol=0.0, maxiter=MOST_TURNS
     )
     return solution

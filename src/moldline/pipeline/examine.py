@@ -123,20 +123,18 @@ class Proof:
 def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
     """Search a deformation for folds, at samples; a small fold between them is not seen."""
     points = np.asarray(pipeline.geometry.points)
-    nets = [stage.deformer for stage in pipeline.own_stages]
+    steps = pipeline.steps(values)
+    nets = [step.deformer for step in steps]
     samples = [net.samples(MOST_SAMPLES) for net in nets if isinstance(net, AbstractControlNet)]
     places = np.concatenate([points, *samples])
     slopes: np.ndarray = np.broadcast_to(np.eye(3), (len(places), 3, 3))
     rest: Array = jnp.asarray(places)
     present: Array = rest
-    full = pipeline.values(values)
-    for stage in pipeline.own_stages:
-        controls = stage.controls(full)
-        if stage.carried:
-            slopes = slopes + np.asarray(map_slopes(stage.deformer, rest, controls)) - np.eye(3)
-        else:
-            slopes = np.asarray(map_slopes(stage.deformer, present, controls)) @ slopes
-        present = stage.after(rest, present, controls)
+    for step in steps:
+        is_carried = step.stage.carried
+        own = map_slopes(step.deformer, rest if is_carried else present, step.controls)
+        slopes = slopes + np.asarray(own) - np.eye(3) if is_carried else np.asarray(own) @ slopes
+        present = step.after(rest, present)
     determinants = np.linalg.det(slopes)
     worst = int(determinants.argmin())
     return Folding(
@@ -151,21 +149,19 @@ def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
     """Stages that tear the mesh where it leaves their boxes."""
     edges = joined_points(pipeline.geometry)
     found = []
-    full = pipeline.values(values)
     rest = np.asarray(pipeline.geometry.points)
     present = rest
     size = float(np.ptp(rest, axis=0).max())
-    for stage in pipeline.own_stages:
-        controls = stage.controls(full)
-        if isinstance(stage.deformer, AbstractControlNet):
-            bound = rest if stage.carried else present
-            places, gaps = stage.deformer.tears(bound, edges, controls)
+    for step in pipeline.steps(values):
+        if isinstance(step.deformer, AbstractControlNet):
+            bound = rest if step.stage.carried else present
+            places, gaps = step.deformer.tears(bound, edges, step.controls)
             torn = np.flatnonzero(gaps > 1e-9 * size)
             if len(torn):
                 widest = int(gaps.argmax())
-                tear = Tear(stage.name, len(torn), float(gaps[widest]), _place(places[widest]))
-                found.append(tear)
-        present = np.asarray(stage.after(rest, present, controls))
+                place = _place(places[widest])
+                found.append(Tear(step.stage.name, len(torn), float(gaps[widest]), place))
+        present = np.asarray(step.after(rest, present))
     return found
 
 

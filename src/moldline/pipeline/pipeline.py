@@ -13,11 +13,12 @@ from tqdm import tqdm
 
 from .._types import Array, Points
 from ..deformers.base import AbstractBinding
+from ..deformers.chain import plain
 from ..errors import ParameterError
 from ..mesh import Geometry
 from ..mesh.cloud import Cloud
 from ..parameters.variable import Variable
-from .stage import Stage
+from .stage import Stage, Step
 
 Values: TypeAlias = Mapping[str, Any]
 
@@ -105,6 +106,25 @@ class Pipeline(eqx.Module):
                         moved = state[name] + (moved - rest)
                 state[name] = stage.held(rest, moved)
         return state[self.result]
+
+    def steps(self, values: Values | None = None) -> list[Step]:
+        """What moves points, stage by stage; pilots behind another stage see the present shape."""
+        full = self.values(values)
+        present = self.geometries[self.result.split("/")[0]].points
+        rest, found = present, []
+        for number, stage in enumerate(self._on(self.result)):
+            moving, controls = stage.deformer, stage.controls(full)
+            if stage.settles and number > 0 and not stage.carried:
+                moving, controls = moving.settle(present, controls)
+            parts = plain(moving, controls)
+            if stage.carried and len(parts) > 1:  # each part would be carried by itself
+                parts = [(moving, controls)]
+            own = [Step(stage, *part) for part in parts]
+            found += own
+            if self._settles:
+                for step in own:
+                    present = step.after(rest, present)
+        return found
 
     def pushforward(self, values: Values | None, directions: Values) -> Points:
         """Derivative of the points along a change of the values, shape (n, 3)."""

@@ -1,6 +1,7 @@
 """One step of a pipeline: a deformer, and the links that turn variables into its controls."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -91,12 +92,6 @@ class Stage(eqx.Module):
         except GeometryError as error:
             raise GeometryError(f"stage {self.name!r} on {geometry!r}: {error}") from None
 
-    def after(self, rest: Points, present: Points, controls: Vector) -> Points:
-        """Where it takes points that are not bound, from where they are at rest and at present."""
-        if self.carried:
-            return present + (self.deformer.follow(rest, controls) - rest)
-        return self.deformer.follow(present, controls)
-
     def held(self, rest: Points, moved: Points) -> Points:
         """Points on the plane of symmetry put back on it, which only undoes rounding."""
         if self.across is None:
@@ -104,3 +99,27 @@ class Stage(eqx.Module):
         axis = "xyz".index(self.across)
         on_plane = rest[:, axis] == 0.0
         return jnp.asarray(moved).at[:, axis].set(jnp.where(on_plane, 0.0, moved[:, axis]))
+
+
+class Step(NamedTuple):
+    """What moves points in a stage, at some values of the variables.
+
+    Attributes
+    ----------
+    stage
+        Whose step it is.
+    deformer
+        The deformer that acts in the end: of a skeleton or of pilots the hidden one.
+    controls
+        Its controls.
+    """
+
+    stage: Stage
+    deformer: AbstractDeformer
+    controls: Vector
+
+    def after(self, rest: Points, present: Points) -> Points:
+        """Where it takes points from where they are at rest and at present."""
+        if self.stage.carried:
+            return present + (self.deformer.follow(rest, self.controls) - rest)
+        return self.deformer.follow(present, self.controls)

@@ -24,11 +24,14 @@ class Net(NamedTuple):
         Pairs of control points that lines join, shape (l, 2).
     rest, moved
         Where they are at rest and where the controls put them, shape (m, 3).
+    is_hidden
+        Whether it is drawn by its lines alone, as what is behind pilots.
     """
 
     lines: Any
     rest: Any
     moved: Any
+    is_hidden: bool = False
 
 
 def draw_net(
@@ -38,11 +41,13 @@ def draw_net(
     moved: Any = None,
     highlighted: Any = (),
     view: View | str = "iso",
+    is_hidden: bool = False,
 ) -> None:
     """Draw a lattice or cage: at rest thin, grey and dashed, moved dark with red control points.
 
     `rest` and `moved` are control points (m, 3), `lines` pairs of their numbers, `highlighted` the
-    numbers of those drawn larger. What is farther from the eye is paler.
+    numbers of those drawn larger. What is farther from the eye is paler. Of a hidden net only the
+    lines are drawn.
     """
     shown = View.of(view)
     flat = shown.project(rest)
@@ -53,7 +58,8 @@ def draw_net(
         flat = shown.project(moved)
         _draw_lines(axes, flat, lines, DARK, 0.8, "-")
     right, up, depth = flat.T
-    axes.scatter(right, up, s=13, color=_faded(RED, depth), zorder=4, linewidths=0)
+    if not is_hidden:
+        axes.scatter(right, up, s=13, color=_faded(RED, depth), zorder=4, linewidths=0)
     if len(highlighted):
         places = right[highlighted], up[highlighted]
         axes.scatter(*places, s=80, color="#ffd43b", edgecolors=DARK, lw=0.9, zorder=5)

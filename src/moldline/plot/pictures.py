@@ -4,17 +4,16 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from .._types import Array, Vector
+from .._types import Points
 from ..deformers.net import AbstractControlNet
-from ..deformers.posed import AbstractPosed
+from ..deformers.pilots import Pilots
 from ..errors import ParameterError
 from ..mesh import Cloud, Geometry, Section, VolumeMesh
 from ..mesh.joined import joined_points
 from ..pipeline.pipeline import Pipeline, Values
-from ..pipeline.stage import Stage
+from ..pipeline.stage import Step
 from .figure import blank
 from .nets import Net, draw_net
 from .sections import draw_section, section_picture
@@ -83,7 +82,7 @@ def of_sensitivity(
         motion[:, axis],
         label,
         nets(pipeline, values),
-        _highlighted(pipeline, direction),
+        _highlighted(pipeline, values, direction),
         view,
         title,
     )
@@ -104,56 +103,52 @@ def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
 
 
 def nets(pipeline: Pipeline, values: Values | None = None) -> list[Net]:
-    """Control points of a pipeline's stages."""
-    full = pipeline.values(values)
+    """Control points of a pipeline's stages, and the places that pilots hold."""
     found = []
-    for stage, net in _nets(pipeline):
-        rest = net.rest.reshape(-1, 3)
-        place = _carried(pipeline, stage, rest, full) if stage.carried else rest
-        moves = net.moves(_net_controls(stage, stage.controls(full)))
-        found.append(Net(net.lines, rest, place + np.asarray(moves).reshape(-1, 3)))
+    steps = pipeline.steps(values)
+    for number, step in enumerate(steps):
+        if isinstance(step.deformer, AbstractControlNet):
+            rest = step.deformer.rest.reshape(-1, 3)
+            carrying = steps[:number] if step.stage.carried else []
+            moves = np.asarray(step.deformer.moves(step.controls)).reshape(-1, 3)
+            moved = _after(carrying, rest) + moves
+            found.append(Net(step.deformer.lines, rest, moved, _pilots(step) is not None))
+        is_last = number + 1 == len(steps) or steps[number + 1].stage is not step.stage
+        pilots = _pilots(step)
+        if pilots is not None and is_last:
+            base = pipeline.geometries[pipeline.result.split("/")[0]].points
+            moved = _after(steps[: number + 1], base)
+            before, after = (np.asarray(pilots.marks(shape)) for shape in (base, moved))
+            found.append(Net(np.empty((0, 2), int), before, after))
     return found
 
 
-def _carried(pipeline: Pipeline, last: Stage, rest: np.ndarray, values: Values) -> np.ndarray:
-    """Where the stages before a carried one take its control points."""
+def _pilots(step: Step) -> Pilots | None:
+    return step.stage.deformer if isinstance(step.stage.deformer, Pilots) else None
+
+
+def _after(steps: Sequence[Step], rest: Points) -> np.ndarray:
+    """Where some steps take places."""
     place = rest
-    for stage in pipeline.own_stages:
-        if stage is last:
-            break
-        place = np.asarray(stage.after(rest, place, stage.controls(values)))
-    return place
+    for step in steps:
+        place = step.after(rest, place)
+    return np.asarray(place)
 
 
-def _nets(pipeline: Pipeline) -> list[tuple[Stage, AbstractControlNet]]:
-    found = []
-    for stage in pipeline.own_stages:
-        if isinstance(stage.deformer, AbstractControlNet):
-            found.append((stage, stage.deformer))
-        elif isinstance(stage.deformer, AbstractPosed) and isinstance(
-            stage.deformer.net, AbstractControlNet
-        ):
-            found.append((stage, stage.deformer.net))
-    return found
-
-
-def _net_controls(stage: Stage, controls: Vector) -> Float[Array, "n"]:
-    if isinstance(stage.deformer, AbstractPosed):
-        return stage.deformer.pose(controls)
-    return controls
-
-
-def _highlighted(pipeline: Pipeline, direction: dict[str, np.ndarray]) -> list[np.ndarray]:
+def _highlighted(
+    pipeline: Pipeline, values: Values | None, direction: dict[str, np.ndarray]
+) -> list[np.ndarray]:
     """Of each net the control points that a number moves."""
-    found = []
-    for stage, net in _nets(pipeline):
-        controls = np.zeros(stage.deformer.size)
-        for variable, link in stage.links.items():
-            if variable.name in direction:
-                controls = controls + np.asarray(link.matrix) @ direction[variable.name]
-        moves = np.asarray(net.moves(_net_controls(stage, controls))).reshape(-1, 3)
-        found.append(np.flatnonzero(np.any(moves != 0, axis=1)))
-    return found
+    small = 1e-6 * max(pipeline.variables[name].typical for name in direction)
+    full = {name: np.asarray(value) for name, value in pipeline.values(values).items()}
+    there = {name: full[name] + small * direction.get(name, 0.0) for name in full}
+    pairs = zip(nets(pipeline, full), nets(pipeline, there), strict=True)
+    return [
+        np.array([], int)
+        if before.is_hidden
+        else np.flatnonzero(np.any(before.moved != after.moved, axis=1))
+        for before, after in pairs
+    ]
 
 
 def _among_points(geometry: Geometry, drawn: list[Net], view: View | str, title: str) -> Figure:
@@ -162,7 +157,7 @@ def _among_points(geometry: Geometry, drawn: list[Net], view: View | str, title:
     (axes,) = figure.axes
     shown = View.of("top" if getattr(geometry, "dimension", 3) == 2 else view)
     for net in drawn:
-        draw_net(axes, *net, view=shown)
+        draw_net(axes, net.lines, net.rest, net.moved, view=shown, is_hidden=net.is_hidden)
     if drawn:
         corners = np.concatenate([places for net in drawn for places in (net.rest, net.moved)])
         low, high = (f(shown.project(corners)[:, :2], axis=0) for f in (np.min, np.max))

@@ -36,8 +36,10 @@ def draw_section(
         axes.add_collection(
             LineCollection(rest[net.lines], colors=GREY, linewidths=0.5, linestyles=DASHES)
         )
-        axes.add_collection(LineCollection(new[net.lines], colors=RED, linewidths=0.7))
-        axes.scatter(new[:, 0], new[:, 1], s=20, color=RED, zorder=3)
+        colour = GREY if net.is_hidden else RED
+        axes.add_collection(LineCollection(new[net.lines], colors=colour, linewidths=0.7))
+        if not net.is_hidden:
+            axes.scatter(new[:, 0], new[:, 1], s=20, color=RED, zorder=3)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel(plane[0])

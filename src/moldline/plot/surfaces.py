@@ -87,8 +87,9 @@ def before_and_after(
     draw_surface(left, points, faces, view=view)
     draw_surface(right, moved, faces, view=view)
     for net in nets:
-        draw_net(left, net.lines, net.rest, view=view)
-        draw_net(right, *net, view=view)
+        hidden = net.is_hidden
+        draw_net(left, net.lines, net.rest, view=view, is_hidden=hidden)
+        draw_net(right, net.lines, net.rest, net.moved, view=view, is_hidden=hidden)
     for axes, name in ((left, "before"), (right, "after")):
         axes.update_datalim([low, high])  # both at one scale and place
         axes.autoscale_view()
@@ -115,7 +116,8 @@ def sensitivity_map(
     axes = figure.subplots()
     draw_surface(axes, points, faces, values, view, label)
     for net, chosen in zip(nets, highlighted or [()] * len(nets), strict=True):
-        draw_net(axes, net.lines, net.moved, highlighted=chosen, view=view)
+        hidden = net.is_hidden
+        draw_net(axes, net.lines, net.moved, highlighted=chosen, view=view, is_hidden=hidden)
     axes.set_title(title, fontsize=15)
     return figure
 

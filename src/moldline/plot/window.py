@@ -44,9 +44,11 @@ def show(geometry: Geometry, values: Any = None, label: str = "", nets: Sequence
         colours["clim"] = (-largest, largest)
     plotter.add_mesh(shape, show_edges=len(points) < 2_000, **colours)
     for net in nets:
-        joined = np.insert(np.asarray(net.lines), 0, 2, axis=1).ravel()
-        plotter.add_mesh(pyvista.PolyData(np.asarray(net.moved), lines=joined), color=GREY)
-        plotter.add_points(net.moved, color=RED, point_size=9, render_points_as_spheres=True)
+        if len(net.lines):
+            joined = np.insert(np.asarray(net.lines), 0, 2, axis=1).ravel()
+            plotter.add_mesh(pyvista.PolyData(np.asarray(net.moved), lines=joined), color=GREY)
+        if not net.is_hidden:
+            plotter.add_points(net.moved, color=RED, point_size=9, render_points_as_spheres=True)
     plotter.add_axes()
     plotter.show()
 

@@ -1,0 +1,54 @@
+"""Whether a motion that meets conditions is the least one nearby, by its second derivatives."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import scipy.sparse.linalg
+
+from .._types import Array, Vector
+from ..numerics.least_norm import Problem, Solution
+
+ACCURACY = 1e-3
+"""Of the smallest curvature."""
+
+
+def smallest_curvature(problem: Problem, motion: Vector, solution: Solution) -> float:
+    """The least growth of the cost, per cost, along motions that keep all conditions.
+
+    The smallest eigenvalue of the Lagrangian's second derivative in the weighted controls, on the
+    motions that the active conditions leave free: above 0 the motion is a minimum, and depends
+    smoothly on what is asked.
+    """
+    root = np.sqrt(np.asarray(problem.weights))
+    active = np.asarray(solution.active)
+    slopes = np.asarray(problem.evaluated(motion)[1])[active] / root
+    forces = jnp.where(solution.active, solution.multipliers, 0.0)
+    kept = np.linalg.qr(slopes.T)[0] if len(slopes) else np.zeros((len(root), 0))
+    if kept.shape[1] >= len(root):
+        return 1.0
+
+    def gradient(x: Array) -> Array:
+        return jax.vjp(problem.missing, x)[1](forces)[0]
+
+    push = jax.jit(jax.linearize(gradient, motion)[1])
+
+    def free(vector: np.ndarray) -> np.ndarray:
+        return vector - kept @ (kept.T @ vector)
+
+    def product(vector: np.ndarray) -> np.ndarray:
+        """What the cost's own curvature, 1, leaves: that of the conditions alone."""
+        along = free(np.ravel(vector))
+        return free(np.asarray(push(along / root)) / root)
+
+    shape = (len(root), len(root))
+    operator = scipy.sparse.linalg.LinearOperator(shape, product, dtype=float)
+    begin = np.random.default_rng(0).normal(size=len(root))
+    if np.linalg.norm(product(begin)) <= 1e-12 * np.linalg.norm(begin):
+        return 1.0
+    try:
+        low = scipy.sparse.linalg.eigsh(
+            operator, k=1, which="SA", tol=ACCURACY, v0=begin, return_eigenvectors=False
+        )
+    except scipy.sparse.linalg.ArpackNoConvergence as error:
+        low = error.eigenvalues if len(error.eigenvalues) else np.array([np.nan])
+    return float(1 + min(low[0], 0.0))

@@ -163,3 +163,20 @@ def test_a_hundred_thousand_faces_against_ten_thousand_are_no_matter(ball):
     assert 0.26 < value < 0.3
     assert np.count_nonzero(np.any(np.asarray(slope) != 0, axis=1)) <= 3
     np.testing.assert_allclose(np.linalg.norm(np.asarray(slope).sum(axis=0)), 1.0, rtol=1e-9)
+
+
+def test_second_derivatives_are_exact_too(ball):
+    """Found pairs are differentiated as planes, lines and points, not as fixed places."""
+    import jax
+
+    rng = np.random.default_rng(0)
+    points = np.asarray(ball.points) + 1e-3 * rng.normal(size=ball.points.shape)
+    along, step = 1e-3 * rng.normal(size=points.shape), 1e-3
+    for measure in (
+        Enclosed(ball.faces, [[0.5, 0.31, 0.1], [0.02, 0.03, 1.4]]),
+        Clearance(ball.faces, 0.5 * points + np.array([2.0, 0.7, 0.4]), ball.faces),
+    ):
+        slope = jax.grad(lambda p, m=measure: m(p).sum())
+        exact = jax.jvp(slope, (points,), (along,))[1]
+        about = (slope(points + step * along) - slope(points - step * along)) / (2 * step)
+        np.testing.assert_allclose(exact, about, rtol=0, atol=1e-7 * np.abs(about).max())

@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Array, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Geometry
-from .base import AbstractMeasure
+from .base import AbstractMeasure, as_rows
 from .directions import Along, Way, direction
 from .needs import span
 from .picks import Place, Region
 from .picks import spots as picked
-from .spot import Spot, gathered
+from .spot import Spot, gathered, padded
 from .stations import station
 
 AROUND = (0.04, 0.16, 0.36, 0.64, 1.0)
@@ -83,11 +83,13 @@ class Circularity(AbstractMeasure):
     """How far each spot is outside the circle nearest to them all, in a plane [m]."""
 
     reads: np.ndarray
-    matrix: Float[np.ndarray, "s r"]
+    rows: Int[np.ndarray, "s w"]
+    weights: Float[np.ndarray, "s w"]
     plane: Float[np.ndarray, "2 3"]
 
     def __init__(self, spots: Sequence[Spot], normal: Along = "x"):
-        self.reads, self.matrix = gathered(_three(spots))
+        rows, self.weights = padded(_three(spots))
+        self.reads, self.rows = as_rows(rows)
         self.plane = spanned(normal)
 
     @classmethod
@@ -106,11 +108,11 @@ class Circularity(AbstractMeasure):
     @property
     @override
     def size(self) -> int:
-        return len(self.matrix)
+        return len(self.rows)
 
     @override
     def of(self, places: Points) -> Vector:
-        flat = self.matrix @ places @ self.plane.T
+        flat = jnp.einsum("sw,swi->si", self.weights, places[self.rows]) @ self.plane.T
         centre, radius = circle(flat)
         return jnp.linalg.norm(flat - centre, axis=1) - radius
 

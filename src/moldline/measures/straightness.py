@@ -4,17 +4,17 @@ from collections.abc import Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from typing_extensions import override
 
 from .._types import Array, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Geometry, Section
-from .base import AbstractMeasure
+from .base import AbstractMeasure, as_rows
 from .circularity import spanned
 from .picks import Place, Region, row
 from .picks import spots as picked
-from .spot import Spot, gathered
+from .spot import Spot, gathered, padded
 from .stations import Side
 
 
@@ -93,19 +93,20 @@ class Planarity(AbstractMeasure):
 
     Attributes
     ----------
-    matrix
-        What of the points read the sides from the first of the three are: to the two others, then
-        to all other spots.
+    rows, weights
+        Points of each spot, counted among those read, and their weights; the first three span the
+        plane.
     """
 
     reads: np.ndarray
-    matrix: Float[np.ndarray, "s r"]
+    rows: Int[np.ndarray, "s w"]
+    weights: Float[np.ndarray, "s w"]
 
     def __init__(self, spots: Sequence[Spot]):
         if len(spots) < 4:
             raise ParameterError(f"a plane needs four spots or more, got {len(spots)}")
-        self.reads, matrix = gathered(spots)
-        self.matrix = matrix[1:] - matrix[0]
+        rows, self.weights = padded(spots)
+        self.reads, self.rows = as_rows(rows)
 
     @classmethod
     @override
@@ -129,12 +130,13 @@ class Planarity(AbstractMeasure):
     @property
     @override
     def size(self) -> int:
-        return len(self.matrix) - 2
+        return len(self.rows) - 3
 
     @override
     def of(self, places: Points) -> Vector:
-        one, other, *_ = sides = self.matrix @ places
-        normal = jnp.cross(one, other)
+        spots = jnp.einsum("sw,swi->si", self.weights, places[self.rows])
+        sides = spots[1:] - spots[0]
+        normal = jnp.cross(sides[0], sides[1])
         return sides[2:] @ (normal / jnp.linalg.norm(normal))
 
 

@@ -7,10 +7,11 @@ import moldline as ml
 
 PUBLIC = {
     "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "BodySkeleton", "Bone", "Bones",
-    "Cage", "Cloud", "Constraint", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Lattice",
-    "LinearBinding", "Link", "Pipeline", "Planform", "Section", "Skeleton", "Spot", "Stage", "Surface",
-    "Variable", "VolumeMesh", "WingSkeleton", "planform", "errors", "links", "load", "measures", "plot", "read",
-    "read_sensitivities", "variable", "write", "write_sensitivities",
+    "Cage", "Cloud", "Constraint", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge",
+    "Lattice", "LinearBinding", "Link", "Measurements", "Pilots", "Pipeline", "Planform", "Section",
+    "Skeleton", "Spot", "Stage", "Surface", "Variable", "VolumeMesh", "WingSkeleton", "errors",
+    "links", "load", "measures", "planform", "plot", "read", "read_sensitivities", "variable",
+    "write", "write_sensitivities",
 }  # fmt: skip
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .deformers.foreign import AbstractNumpyDeformer
     from .deformers.hinge import Hinge
     from .deformers.lattice import Lattice
+    from .deformers.pilots import Pilots
     from .deformers.skeleton import Skeleton
     from .deformers.wing_skeleton import WingSkeleton
     from .measures.base import Constraint
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from .parameters import links
     from .parameters.link import Link
     from .parameters.variable import Variable, variable
+    from .pipeline.measurements import Measurements
     from .pipeline.pipeline import Pipeline
     from .pipeline.stage import Stage
 
@@ -57,6 +59,8 @@ _HOMES = {
     "Lattice": "deformers.lattice",
     "LinearBinding": "deformers.base",
     "Link": "parameters.link",
+    "Measurements": "pipeline.measurements",
+    "Pilots": "deformers.pilots",
     "Planform": "mesh.planform",
     "Pipeline": "pipeline.pipeline",
     "Section": "mesh",

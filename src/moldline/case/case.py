@@ -20,9 +20,10 @@ from ..mesh.io.files import replacing
 from ..parameters.link import Link
 from ..parameters.links import LINKS, mirrored
 from ..parameters.variable import Variable, variable
+from ..pipeline.measurements import Measurements
 from ..pipeline.pipeline import Pipeline
 from ..pipeline.stage import Stage
-from . import options, schema
+from . import built, options, schema
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,15 @@ class Case:
         What it describes.
     riders
         Pipelines of the points that ride on a geometry, by name.
+    measurements
+        Measures of the resulting geometry, with their bounds.
     """
 
     path: Path
     tables: schema.CaseTable
     pipeline: Pipeline
     riders: dict[str, Pipeline]
+    measurements: Measurements
 
     def units(self, rider: str | None = None) -> str | None:
         """The unit of the resulting geometry's file, or of a rider's."""
@@ -87,9 +91,9 @@ class Case:
         if target.parent.resolve() != self.path.parent.resolve():
             for table in (*tables["geometry"].values(), *tables.get("rider", {}).values()):
                 table["file"] = str((self.path.parent / table["file"]).resolve())
-            for table in tables.get("stage", []):
-                for key in options.paths(registry.deformer(table["deformer"])).keys() & table:
-                    table[key] = str((self.path.parent / table[key]).resolve())
+            for kind in ("stage", "measure"):
+                if kind in tables:
+                    tables[kind] = built.relocated(tables[kind], self.path.parent)
         with replacing(target) as stream:
             stream.write(tomli_w.dumps(_without_none(tables)).encode())
 
@@ -109,7 +113,7 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
     }
     variables = {name: _variable(file, name, table) for name, table in tables.variable.items()}
     stages = [
-        _stage(file, f"stage.{i}", table, geometries, variables)
+        _stage(file, f"stage.{i}", table, geometries, variables, sampled)
         for i, table in enumerate(tables.stage)
     ]
     unused = variables.keys() - {v.name for stage in stages for v in stage.links}
@@ -127,7 +131,21 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
         if isinstance(error, CaseError):
             raise
         raise CaseError(f"{file}: {error}") from None
-    return Case(place, tables, pipeline, riders)
+    return Case(place, tables, pipeline, riders, _measurements(file, tables, pipeline, sampled))
+
+
+def _measurements(
+    file: str, tables: schema.CaseTable, pipeline: Pipeline, sampled: bool
+) -> Measurements:
+    if sampled:
+        return Measurements(pipeline, {})
+    return Measurements(
+        pipeline,
+        {
+            name: built.measure(file, f"measure.{name}", table, pipeline.geometry)
+            for name, table in tables.measure.items()
+        },
+    )
 
 
 def _read(
@@ -159,6 +177,7 @@ def _stage(
     table: schema.StageTable,
     geometries: dict[str, Geometry],
     variables: dict[str, Variable],
+    sampled: bool,
 ) -> Stage:
     on = table.on or (next(iter(geometries)) if len(geometries) == 1 else "")
     if on not in geometries:
@@ -167,11 +186,11 @@ def _stage(
         )
     try:
         cls = registry.deformer(table.deformer)
-        model = options.of_deformer(table.deformer, cls)
-        given = schema.checked(model, table.model_extra or {}, file, where)
-        paths = options.paths(cls) | given
-        places = {k: Path(file).parent / v for k, v in paths.items() if isinstance(v, Path)}
-        deformer = cls.build(geometries[on], **given | places)
+        if sampled and cls.settle is not AbstractDeformer.settle:
+            raise ParameterError(
+                "this deformer must see the whole geometry, which is not there when it is streamed"
+            )
+        deformer = built.deformer(file, where, table, geometries[on])
         links: dict[Variable, Link] = {}
         for i, row in enumerate(table.link):
             place = f"{where}.link.{i}"

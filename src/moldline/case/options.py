@@ -7,12 +7,31 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from ..deformers.base import AbstractDeformer
+from ..measures.base import AbstractMeasure
 from ..parameters.links import chosen_controls
 
 Numbers = float | list[Any]
+Pair = tuple[float, float]
+
+
+class DeformerTable(BaseModel):
+    """A deformer within another one's options; further keys are its own."""
+
+    model_config = ConfigDict(extra="allow")
+    deformer: str
+
+
+class MeasureTable(BaseModel):
+    """A measure, with bounds where it is a constraint; further keys are its own."""
+
+    model_config = ConfigDict(extra="allow")
+    measure: str
+    bounds: Pair | list[Pair] | None = Field(None, description="lower and upper, SI; or inf")
+    weight: float = Field(1.0, gt=0, description="in least squares of what contradicts itself")
+
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = 120
@@ -31,12 +50,12 @@ def model_of(name: str, parameters: Mapping[str, inspect.Parameter]) -> type[Bas
     return create_model(name, __base__=_Closed, **fields)
 
 
-def of_deformer(name: str, cls: type[AbstractDeformer]) -> type[BaseModel]:
-    """What a case file may say to build a deformer."""
+def of_class(name: str, cls: type[AbstractDeformer | AbstractMeasure]) -> type[BaseModel]:
+    """What a case file may say to build a deformer or a measure."""
     return model_of(name, cls.options())
 
 
-def paths(cls: type[AbstractDeformer]) -> dict[str, Any]:
+def paths(cls: type[AbstractDeformer | AbstractMeasure]) -> dict[str, Any]:
     """Options that are paths, and what they are where a case file does not say."""
     found = {k: o for k, o in cls.options().items() if o.annotation in (Path, Path | None)}
     return {k: o.default for k, o in found.items()}
@@ -63,9 +82,19 @@ def _plain(annotation: Any) -> Any:
     """The type of a TOML value for an annotation: arrays are lists of numbers."""
     if annotation is inspect.Parameter.empty:
         return Any
+    if _holds(annotation, AbstractMeasure):
+        return dict[str, MeasureTable] | None
+    if _holds(annotation, AbstractDeformer):
+        return DeformerTable | list[DeformerTable] | None
     if _is_array(annotation):
         return Numbers
     return annotation
+
+
+def _holds(annotation: Any, base: type) -> bool:
+    if parts := typing.get_args(annotation):
+        return any(_holds(part, base) for part in parts)
+    return isinstance(annotation, type) and issubclass(annotation, base)
 
 
 def _is_array(annotation: Any) -> bool:

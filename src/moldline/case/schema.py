@@ -12,11 +12,11 @@ from ..mesh.io.files import contents
 from ..parameters.links import LINKS
 from ..parameters.variable import UNITS
 from . import options
+from .options import DeformerTable, MeasureTable, Pair
 
 VERSION = 1
 """Of the case file's format; a file of another version is refused with a word on what to do."""
 
-Pair = tuple[float, float]
 Unit = Literal[tuple(UNITS)]
 LengthUnit = Literal["m", "cm", "mm", "in", "ft"]
 
@@ -91,6 +91,7 @@ class CaseTable(Table):
     geometry: dict[str, GeometryTable] = Field(min_length=1)
     variable: dict[str, VariableTable] = Field(default_factory=dict)
     stage: list[StageTable] = Field(default_factory=list)
+    measure: dict[str, MeasureTable] = Field(default_factory=dict)
     rider: dict[str, RiderTable] = Field(default_factory=dict)
     output: OutputTable = OutputTable()
 
@@ -131,27 +132,39 @@ def json_schema() -> dict[str, Any]:
     """JSON Schema of the case file, with the options of every installed deformer and link."""
     schema = CaseTable.model_json_schema()
     definitions = schema["$defs"]
-    definitions["StageTable"] = _choice(
-        definitions["StageTable"],
-        "deformer",
-        {name: options.of_deformer(name, registry.deformer(name)) for name in registry.deformers()},
-    )
-    definitions["LinkTable"] = _choice(
-        definitions["LinkTable"],
-        "link",
-        {name: options.of_link(name, function) for name, function in LINKS.items()},
-    )
+    deformers = {
+        name: options.of_class(name, registry.deformer(name)) for name in registry.deformers()
+    }
+    measures = {
+        name: options.of_class(name, registry.measure(name)) for name in registry.measures()
+    }
+    links = {name: options.of_link(name, function) for name, function in LINKS.items()}
+    hidden = DeformerTable.model_json_schema()
+    for name, table, key, models in (
+        ("StageTable", definitions["StageTable"], "deformer", deformers),
+        ("DeformerTable", hidden, "deformer", deformers),
+        ("MeasureTable", definitions["MeasureTable"], "measure", measures),
+        ("LinkTable", definitions["LinkTable"], "link", links),
+    ):
+        definitions[name] = _choice(table, key, models, definitions)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "moldline case file",
     } | schema
 
 
-def _choice(table: dict[str, Any], key: str, models: dict[str, type[BaseModel]]) -> dict[str, Any]:
+def _choice(
+    table: dict[str, Any],
+    key: str,
+    models: dict[str, type[BaseModel]],
+    definitions: dict[str, Any],
+) -> dict[str, Any]:
     """A table whose further keys depend on one of its own."""
     branches = []
     for name, model in models.items():
         own = model.model_json_schema()
+        for kind, definition in own.get("$defs", {}).items():
+            definitions.setdefault(kind, definition)
         branches.append(
             {
                 "properties": table["properties"]

@@ -40,8 +40,8 @@ SHOWN = 12
 AT_LIMIT = 1e-9
 """A bound that holds with less force than this part of the largest is about to let go."""
 
-Pilot = AbstractMeasure | Spot
-"""A spot is prescribed in all three directions."""
+Pilot = AbstractMeasure | Spot | Constraint
+"""A spot is prescribed in all three directions; a constraint is refused."""
 
 Kept = AbstractMeasure | Constraint
 """A measure stays as it is at rest, a constraint within its bounds."""
@@ -166,6 +166,23 @@ class Pilots(AbstractPosed):
         self.response = self.conditions.response(slopes)[:, : self.size] if self.is_linear else None
         self.solver = jax.jit(lambda x: self._solved(self.readings, self.readings, x))
 
+    @classmethod
+    @override
+    def build(
+        cls,
+        geometry: Geometry,
+        *,
+        pilot: Mapping[str, AbstractMeasure | Constraint],
+        constraint: Mapping[str, AbstractMeasure | Constraint] | None = None,
+        hidden: AbstractDeformer | Sequence[AbstractDeformer] | None = None,
+        weights: float | list[float] = 1.0,
+        step: float = 1.0,
+        margin: float = 0.1,
+    ) -> "Pilots":
+        """From a case file: measures by name, and the hidden deformer or several."""
+        options: dict[str, Any] = {"weights": weights, "step": step, "margin": margin}
+        return cls(geometry, pilot, constraint or {}, hidden, **options)
+
     @property
     def measures(self) -> list[AbstractMeasure]:
         """The pilots, and behind them the constraints."""
@@ -282,6 +299,8 @@ def _named(given: Any, kind: str) -> dict[str, Any]:
 
 
 def _measure(pilot: Pilot) -> AbstractMeasure:
+    if isinstance(pilot, Constraint):
+        raise ParameterError("a pilot is prescribed, so it has no bounds; constraints have them")
     return Position(pilot) if isinstance(pilot, Spot) else pilot
 
 

@@ -79,13 +79,13 @@ class Readings:
         self.size = int(ends[-1])
         self.is_affine = [is_net and all(measures[n].is_affine for n in part) for part in parts]
         self._known = [
-            group.slopes(self.neutral) if affine else None
+            jax.jit(group.slopes)(self.neutral) if affine else None
             for group, affine in zip(self.groups, self.is_affine, strict=True)
         ]
 
     def at_rest(self) -> tuple[np.ndarray, np.ndarray]:
         """All numbers and their slopes by the controls at the neutral ones."""
-        values, slopes = self.sloped(jnp.zeros(self.neutral.shape))
+        values, slopes = jax.jit(self.sloped)(jnp.zeros(self.neutral.shape))
         return np.asarray(values), np.asarray(slopes)
 
     def values(self, change: Controls) -> Numbers:

@@ -9,7 +9,10 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-COMMANDS = ("parameterise", "deform", "sensitivity", "check", "info", "convert", "plot", "schema")
+COMMANDS = (
+    "parameterise", "deform", "sensitivity", "measure", "check", "info", "convert", "plot",
+    "schema",
+)  # fmt: skip
 
 DESCRIPTION = """\
 Deform discrete geometry for aerodynamic shape design, with exact sensitivities.

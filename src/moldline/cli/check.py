@@ -163,9 +163,11 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
     from dataclasses import asdict
 
     from ..pipeline import examine
+    from ..pipeline.holding import holding
 
-    embedded, fold, torn, turned, inverted, proof = in_steps(
+    embedded, held, fold, torn, turned, inverted, proof = in_steps(
         embedding=lambda: examine.embedded(pipeline),
+        pilots=lambda: holding(pipeline, chosen),
         folds=lambda: examine.folding(pipeline, chosen),
         tears=lambda: examine.tears(pipeline, chosen),
         turned_faces=lambda: examine.turned_faces(pipeline, chosen),
@@ -178,6 +180,11 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
     )  # fmt: skip
     lines = [
         *(f"embedding    {one}" for one in embedded),
+        *(
+            f"{'  ' if i else 'pilots       '}{line}"
+            for one in held
+            for i, line in enumerate(one.sentences())
+        ),
         f"deformation  smallest Jacobian determinant {fold.smallest:.4g} at "
         f"({x:.4g}, {y:.4g}, {z:.4g}), {fold.at_points:.4g} on the mesh; "
         f"{fold.samples} places looked at",
@@ -189,6 +196,7 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
     ]
     report = {
         "embedding": [{**vars(one), "outside": one.outside.tolist()} for one in embedded],
+        "pilots": [one.as_dict() for one in held],
         "folding": {**asdict(fold), "folds": fold.folds},
         "turned_faces": [int(face) for face in turned[:10]],
         "inverted_cells": [int(cell) for cell in inverted[:10]],
@@ -203,5 +211,6 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
             "is_right": proof.is_right,
         },
     }
-    is_sound = not (fold.folds or torn or len(turned) or len(inverted)) and proof.is_right
+    is_whole = not (fold.folds or torn or len(turned) or len(inverted))
+    is_sound = is_whole and proof.is_right and all(one.is_met for one in held)
     return report, lines, is_sound

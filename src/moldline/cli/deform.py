@@ -32,7 +32,7 @@ def configure(command: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Do it."""
+    """Do it; 0 only if pilots, where there are some, hold what they are asked for."""
     import time
 
     import numpy as np
@@ -41,6 +41,7 @@ def run(given: argparse.Namespace) -> int:
     from ..errors import ParameterError
     from ..mesh.io import write
     from ..pipeline import examine
+    from ..pipeline.holding import holding
 
     case = load(given.case, sampled=given.stream)
     chosen = values.chosen(case, given)
@@ -57,20 +58,22 @@ def run(given: argparse.Namespace) -> int:
     write(target, shape, units=case.units(given.rider))
     rest = np.asarray(pipeline.geometry.points)
     moved = float(np.linalg.norm(np.asarray(shape.points) - rest, axis=1).max())
-    torn = examine.tears(pipeline, chosen)
+    torn, held = examine.tears(pipeline, chosen), holding(pipeline, chosen)
     report = {
         "points": len(rest),
         "largest_motion": moved,
         "seconds": seconds,
         "file": str(target),
         "tears": [vars(tear) for tear in torn],
+        "pilots": [one.as_dict() for one in held],
     }
     lines = [
         f"{target}: {len(rest)} points, moved by up to {moved:.6g}, in {1e3 * seconds:.2f} ms",
         *map(str, torn),
+        *(line for one in held for line in one.sentences()),
     ]
     show(report, given.json, lines)
-    return 0
+    return 0 if all(one.is_met for one in held) else 1
 
 
 def _streamed(case: "Case", target: Path, chosen: dict[str, Any], given: argparse.Namespace) -> int:

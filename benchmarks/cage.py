@@ -5,8 +5,10 @@ usage: python benchmarks/cage.py [--markdown] [--sizes 1300 48000 ...]
 A box of 1 x 0.6 x 0.1 with 26 points around a closed smooth surface. Each row runs in a process of
 its own. `solve` and `embed` are seconds, the cage's coordinates once and then the points' weights;
 other times are medians in milliseconds, and `x` are multiples of `stream`, the sum of all weights
-(`numpy.sum`) in the same row. Blender's Mesh Deform, at its default precision, is timed in the same
-run where `make blender` has made its environment. For one core: `taskset -c 1` before the command.
+(`numpy.sum`) in the same row. `single` is the same with weights in single precision, `single x` in
+multiples of their own stream; `differs` is how far it moves a point elsewhere, in the largest
+displacement of a vertex. Blender's Mesh Deform, at its default precision, is timed in the same run
+where `make blender` has made its environment. For one core: `taskset -c 1` before the command.
 """
 
 import multiprocessing
@@ -34,7 +36,8 @@ PRECISION = 5
 
 COLUMNS = (
     "vertices", "coordinates", "solve", "embed", "stream", "deform", "x", "JVP", "VJP", "VJP x",
-    "Blender bind", "Blender", "Blender/deform", "its cores", "off by", "paper embed", "paper",
+    "single", "single x", "single JVP", "single VJP", "differs", "Blender bind", "Blender",
+    "Blender/deform", "Blender/single", "its cores", "off by", "paper embed", "paper",
 )  # fmt: skip
 
 
@@ -78,13 +81,34 @@ def measured(size: int, coordinates: str) -> table.Row:
         "JVP": median(lambda: push(controls)), "VJP": median(lambda: pull(vectors)),
     }  # fmt: skip
     row |= {"x": row["deform"] / stream, "VJP x": row["VJP"] / stream}
+    moved = np.asarray(binding(controls))
+    del binding, push, pull
+    row |= _single(points, coordinates, controls, moved)
     if coordinates == "harmonic":
         if size <= BLENDER_MOST:
             theirs = blender(points, cage, controls, PRECISION)
-            row |= _compared(theirs, controls, np.asarray(binding(controls)), row["deform"])
+            row |= _compared(theirs, controls, moved, row)
         if size in PAPER:
             row["paper embed"], row["paper"] = PAPER[size]
     return row
+
+
+def _single(points: np.ndarray, coordinates: str, controls: np.ndarray, known: Any) -> table.Row:
+    """The same with weights in single precision, and the largest difference it makes."""
+    import jax
+
+    import moldline as ml
+
+    binding = ml.Cage(*box(), coordinates=coordinates, precision="single").bind(points)
+    push, pull = jax.linearize(binding, controls)[1], jax.vjp(binding, controls)[1]
+    deform = median(lambda: binding(controls))
+    off = np.linalg.norm(np.asarray(binding(controls)) - known, axis=1).max()
+    return {
+        "single": deform, "single x": deform / median(binding.embedding.blocks.sum),
+        "single JVP": median(lambda: push(controls)),
+        "single VJP": median(lambda: pull(known)),
+        "differs": float(off / np.linalg.norm(controls.reshape(-1, 3), axis=1).max()),
+    }  # fmt: skip
 
 
 def box() -> tuple[np.ndarray, np.ndarray]:
@@ -130,14 +154,15 @@ def blender(points: np.ndarray, cage: Any, controls: np.ndarray, precision: int)
             return dict(found)
 
 
-def _compared(found: Any, controls: np.ndarray, ours: np.ndarray, deform: float) -> table.Row:
+def _compared(found: Any, controls: np.ndarray, ours: np.ndarray, row: Any) -> table.Row:
     """Blender's times, and how far its points are from ours, in the largest motion."""
     if found is None:
         return {}
     wall = float(np.median(found["seconds"]))
     return {
         "Blender bind": float(found["bind"]), "Blender": 1e3 * wall,
-        "Blender/deform": 1e3 * wall / deform,
+        "Blender/deform": 1e3 * wall / row["deform"],
+        "Blender/single": 1e3 * wall / row["single"],
         "its cores": float(np.median(found["processor_seconds"])) / wall,
         "off by": float(np.abs(found["deformed"] - ours).max() / np.abs(controls).max()),
     }  # fmt: skip

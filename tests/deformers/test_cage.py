@@ -1,5 +1,6 @@
 """Cages: what they move exactly, what they refuse, and what they keep."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import strategies as st
 from numerics.cages import box, elbow, inside, pair, turned, wing
 
 import moldline as ml
-from moldline.deformers import cage_embedding
+from moldline.deformers import cage_embedding, contract
 from moldline.deformers.contract import check, prove
 from moldline.deformers.table import DenseTable, SparseTable
 from moldline.errors import GeometryError, ParameterError
@@ -23,6 +24,10 @@ KINDS = ("harmonic", "mean value")
 def cage(kind="harmonic", **options):
     cells = 10 if kind == "harmonic" else None
     return ml.Cage(POINTS, FACES, coordinates=kind, cells=cells, **options)
+
+
+def long(**options):
+    return ml.Cage(*box((2, 90, 2), (0.4, 60.0, 0.4)), cells=(6, 120, 6), **options)
 
 
 @pytest.fixture(scope="module")
@@ -61,10 +66,63 @@ def test_derivatives_are_exact_and_the_transpose(kind, places):
     )
 
 
+def table(kind, precision):
+    """A small cage's binding with all weights, or a long one's with those that are not far."""
+    made = cage(precision=precision) if kind == "dense" else long(precision=precision)
+    binding = made.bind(inside(made.rest, made.shape.faces, 400))
+    assert isinstance(binding.embedding, DenseTable if kind == "dense" else SparseTable)
+    return binding
+
+
+@pytest.mark.parametrize("kind", ["dense", "sparse"])
+def test_weights_in_single_precision_cost_no_more_than_their_rounding(kind):
+    """Theirs is 6e-8 of each; the sum's is that of the weights' sizes, which sum to one."""
+    single, double = table(kind, "single"), table(kind, "double")
+    weights = single.embedding.matrix()
+    assert np.array_equal(weights.data, weights.data.astype(np.float32))
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0, rtol=0, atol=1e-7)
+    moves = np.random.default_rng(0).uniform(-1, 1, single.net.size)
+    off = np.linalg.norm(np.asarray(single(moves)) - double(moves), axis=1).max()
+    assert 1e-9 < off / np.linalg.norm(moves.reshape(-1, 3), axis=1).max() < 1e-7
+
+
+@pytest.mark.parametrize("kind", ["dense", "sparse"])
+def test_derivatives_in_single_precision_are_those_of_the_kept_weights(kind):
+    """To rounding of doubles: a product with the weights as they are kept, and its transpose."""
+    binding = table(kind, "single")
+    points, size = binding.embedding.points, binding.net.size
+    assert np.array_equal(binding(np.zeros(size)), points)
+    rng = np.random.default_rng(0)
+    controls, along, vectors = (rng.normal(size=s) for s in (size, size, points.shape))
+    weights = binding.embedding.matrix()
+    moved, pushed = jax.jvp(binding, (controls,), (along,))
+    (pulled,) = jax.vjp(binding, controls)[1](vectors)
+    np.testing.assert_allclose(moved - points, weights @ controls.reshape(-1, 3), atol=1e-13)
+    np.testing.assert_allclose(pushed, weights @ along.reshape(-1, 3), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(pulled.reshape(-1, 3), weights.T @ vectors, rtol=0, atol=1e-12)
+    prove(binding, controls, along)
+    prove(jax.jit(lambda c: binding(c)), controls, along)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_single_precision_keeps_the_contract_but_for_the_definition(kind):
+    """The definition has double weights, so a binding agrees with it to the rounding of its own."""
+    points, faces = box((2, 2, 2), (2.0, 2.0, 2.0))
+    small = ml.Cage(points, faces, coordinates=kind, cells=6, precision="single")
+    places = np.random.default_rng(0).uniform(-0.8, 0.8, (24, 3)) + [0.0, 1.0, 0.0]
+    slow = contract.derivatives_by_points_are_right  # takes no kept weights; proved for double ones
+    for clause in contract.CLAUSES:
+        if clause not in (contract.the_binding_agrees_with_the_definition, slow):
+            clause(small, places)
+    controls = np.random.default_rng(1).uniform(-1, 1, small.size)
+    np.testing.assert_allclose(
+        small.bind(places)(controls), small(places, controls), rtol=0, atol=1e-7
+    )
+
+
 def test_far_vertices_of_a_long_cage_have_no_entries_and_move_the_same(monkeypatch):
-    points, faces = box((2, 90, 2), (0.4, 60.0, 0.4))
-    places = inside(points, faces, 400)
-    thin = ml.Cage(points, faces)
+    thin = long()
+    places = inside(thin.rest, thin.shape.faces, 400)
     sparse = thin.bind(places)
     assert isinstance(sparse.embedding, SparseTable)
     monkeypatch.setattr(cage_embedding, "SPARSE", 0.0)
@@ -233,6 +291,8 @@ def test_wrong_options_are_refused():
         ml.Cage(POINTS, FACES, coordinates="green")
     with pytest.raises(ParameterError, match="numbers of a cage of 26 points, got"):
         ml.Cage(POINTS, FACES, freeze=[26])
+    with pytest.raises(ParameterError, match="precision must be one of double, single, got 'half'"):
+        ml.Cage(POINTS, FACES, precision="half")
 
 
 def test_weights_are_found_once_and_kept(tmp_path, places, monkeypatch):
@@ -255,6 +315,18 @@ def test_weights_are_found_once_and_kept(tmp_path, places, monkeypatch):
     assert file.stat().st_size > 1000
 
 
+def test_each_precision_keeps_weights_of_its_own(tmp_path, places):
+    controls = np.random.default_rng(0).normal(size=cage().size)
+    for precision in ("double", "single"):
+        first, again = (
+            cage(store=tmp_path, precision=precision).bind(places)(controls) for _ in range(2)
+        )
+        assert np.array_equal(first, again)
+    sizes = sorted(file.stat().st_size for file in tmp_path.iterdir())
+    assert len(sizes) == 2 and sizes[0] < 0.6 * sizes[1]
+    assert cage(precision="single").refined()[0].precision == "single"
+
+
 def test_a_store_that_cannot_be_written_to_is_done_without(tmp_path, places):
     (tmp_path / "store").write_text("a file")
     cage(store=tmp_path / "store").bind(places)
@@ -274,6 +346,7 @@ value = [0.1, 0.2]
 deformer = "cage"
 file = "cage.obj"
 cells = 10
+precision = "single"
 [[stage.link]]
 variable = "up"
 link = "groups"
@@ -286,7 +359,8 @@ index = [[[0], [1]], [[2]]]
     expected = np.zeros((26, 3))
     expected[[0, 1], 2], expected[2, 2] = 0.1, 0.2
     direct = cage().bind(np.asarray(case.pipeline.geometry.points))(expected.ravel())
-    np.testing.assert_allclose(moved, direct, rtol=0, atol=1e-9)  # the file rounds the cage
+    np.testing.assert_allclose(moved, direct, rtol=0, atol=2e-8)  # weights in single precision
+    assert case.pipeline.stages[0].deformer.precision == "single"
     assert list((tmp_path / ".moldline").iterdir())
 
 
@@ -302,7 +376,7 @@ def test_a_cage_behind_a_lattice_follows_it_and_keeps_what_left_it_still(places)
     rng = np.random.default_rng(0)
     values = {"move": 0.01 * rng.normal(size=lattice.size), "push": 0.05 * rng.normal(size=78)}
     prove(lambda v: case.points(v), values, {k: 0.2 * v for k, v in values.items()})
-    far = np.array([[5.0, 5.0, 5.0]])
+    far = places + 5.0
     assert np.array_equal(late.follow(far, values["push"]), far)
     assert np.array_equal(late(jnp.asarray(far), values["push"]), far)
 

@@ -9,7 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from typing_extensions import override
 
 from .._types import Array, Points, Vector, is_concrete
@@ -29,6 +29,8 @@ from .net import AXES, AbstractControlNet
 from .refinement import Transfer, kept, subdivided
 
 Coordinates = Literal["harmonic", "mean value"]
+
+Precision = Literal["double", "single"]
 
 BATCH = 2048
 """Points that are looked at together in JAX."""
@@ -58,6 +60,11 @@ class Cage(AbstractControlNet):
         Harmonic: where the grid lies, 0 to 3; the first that does if None.
     store
         Folder that keeps the weights of points, so that they are found once; None keeps none.
+    precision
+        Of the weights that bound points keep. "single" halves what is read, and with it the time;
+        sums are of doubles, and points then lie within 1e-7 of the largest displacement (measured
+        in docs/benchmarks.md). So a binding agrees with the definition to that, not to rounding;
+        its derivatives are exactly its own. Points that move have double weights always.
     frozen
         Which vertices never move, whatever the controls say, shape (m,).
 
@@ -74,6 +81,7 @@ class Cage(AbstractControlNet):
     cells: tuple[int, ...] | None = eqx.field(static=True)
     shift: int | None = eqx.field(static=True)
     store: Path | None = eqx.field(static=True)
+    precision: str = eqx.field(static=True)
     frozen: np.ndarray
 
     def __init__(
@@ -86,16 +94,16 @@ class Cage(AbstractControlNet):
         shift: int | None = None,
         freeze: Sequence[int] = (),
         store: Path | str | None = None,
+        precision: str = "double",
     ):
-        if coordinates not in Coordinates.__args__:  # type: ignore[attr-defined]
-            raise ParameterError(
-                f"coordinates must be one of harmonic, mean value, got {coordinates!r}"
-            )
+        _check_one_of("coordinates", coordinates, Coordinates)
+        _check_one_of("precision", precision, Precision)
         self.shape = shaped(points, faces)
         self.coordinates = coordinates
         self.cells = None if cells is None else tuple(np.atleast_1d(cells).tolist())
         self.shift = shift
         self.store = None if store is None else Path(store)
+        self.precision = precision
         self.frozen = np.zeros(len(self.shape.points), bool)
         self.frozen[self.numbers([[n] for n in freeze]) if len(freeze) else []] = True
 
@@ -182,11 +190,12 @@ class Cage(AbstractControlNet):
         coordinates: Coordinates = "harmonic",
         cells: int | tuple[int, int, int] | None = None,
         freeze: tuple[int, ...] = (),
+        precision: Precision = "double",
         store: Path = Path(".moldline"),
     ) -> "Cage":
         """From a case file: the cage in a file."""
         options: dict[str, Any] = {"coordinates": coordinates, "cells": cells, "freeze": freeze}
-        return cls.read(file, units, store=store, **options)
+        return cls.read(file, units, store=store, precision=precision, **options)
 
     @property
     @override
@@ -241,14 +250,11 @@ class Cage(AbstractControlNet):
         points, moves = jnp.asarray(points), self.moves(jnp.asarray(controls))
         if self.coordinates == "mean value":
             return points + self.solved.evaluated(points) @ moves
-        around = jax.lax.map(self._winding, points, batch_size=BATCH)
-        inside = (around > 0.5)[:, None]
+        still = jax.lax.stop_gradient(points)
+        inside = _inside(still, self.rest, self.shape.faces)[:, None]
         somewhere = jnp.asarray(self.samples(1)[0])  # a slope there is not asked for
         weights = self.solved.evaluated(jnp.where(inside, points, somewhere))
         return points + jnp.where(inside, weights @ moves, 0.0)
-
-    def _winding(self, point: Float[Array, "3"]) -> Float[Array, ""]:
-        return winding_in_jax(point[None], self.rest, self.shape.faces)[0]
 
     @override
     def bind(self, points: Points) -> AbstractBinding:
@@ -294,7 +300,20 @@ class Cage(AbstractControlNet):
         transfer, frozen = kept(weights, self.frozen)
         fine = Cage(
             points, faces, coordinates=self.coordinates, cells=cells, shift=shift,
-            store=self.store,
+            store=self.store, precision=self.precision,
             freeze=np.flatnonzero(frozen).tolist(),
         )  # fmt: skip
         return fine, transfer
+
+
+@jax.jit
+def _inside(points: Points, corners: Array, faces: Array) -> Bool[Array, "n"]:
+    def winds(point: Float[Array, "3"]) -> Float[Array, ""]:
+        return winding_in_jax(point[None], corners, faces)[0]
+
+    return jax.lax.map(winds, points, batch_size=BATCH) > 0.5
+
+
+def _check_one_of(name: str, given: str, names: Any) -> None:
+    if given not in names.__args__:
+        raise ParameterError(f"{name} must be one of {', '.join(names.__args__)}, got {given!r}")

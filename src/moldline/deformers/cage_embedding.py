@@ -16,7 +16,7 @@ from ..numerics.nearest import nearest
 from ..numerics.winding import winding
 from .cage_shape import check_finite, check_inside
 from .embedding import AbstractEmbedding
-from .table import NOTHING, SPARSE, DenseTable, SparseTable, blocked, put
+from .table import KINDS, NOTHING, SPARSE, DenseTable, SparseTable, blocked, put
 
 if TYPE_CHECKING:
     from .cage import Cage
@@ -35,7 +35,10 @@ FORMAT = 2
 
 
 def embedded(cage: "Cage", points: np.ndarray, refuse: bool) -> AbstractEmbedding:
-    """Points with their weights; those outside a harmonic cage are refused, or get none."""
+    """Points with their weights; those outside a harmonic cage are refused, or get none.
+
+    Weights that are not refused are for points that move: used once, so in double precision.
+    """
     if refuse:
         check_finite(points)
     kept = _kept(cage, points) if refuse else None
@@ -45,11 +48,13 @@ def embedded(cage: "Cage", points: np.ndarray, refuse: bool) -> AbstractEmbeddin
     tried = _weights(cage, points, np.sort(rows), False)
     sparse = np.count_nonzero(np.abs(tried) > NOTHING) < SPARSE * tried.size
     parts = _parts(cage, points, refuse)
+    kind = KINDS[cage.precision] if refuse else np.float64
     if sparse:
         pieces = [scipy.sparse.csr_array(np.where(np.abs(w) > NOTHING, w, 0.0)) for _, w in parts]
-        table: AbstractEmbedding = SparseTable(points, scipy.sparse.vstack(pieces, format="csr"))
+        whole = scipy.sparse.vstack(pieces, format="csr", dtype=kind)
+        table: AbstractEmbedding = SparseTable(points, whole)
     else:
-        blocks = blocked(len(points), len(cage.rest))
+        blocks = blocked(len(points), len(cage.rest), kind)
         for first, weights in parts:
             put(blocks, first, weights)
         table = DenseTable(points, blocks)
@@ -86,7 +91,8 @@ def _weights(cage: "Cage", points: np.ndarray, rows: np.ndarray, refuse: bool) -
 
 def _place(cage: "Cage", points: np.ndarray) -> Path:
     """The file that keeps the weights, named by all that they depend on."""
-    digest = hashlib.sha256(f"{FORMAT} {cage.coordinates} {cage.cells} {cage.shift}".encode())
+    options = cage.coordinates, cage.cells, cage.shift, cage.precision
+    digest = hashlib.sha256(f"{FORMAT} {options}".encode())
     for array in (cage.rest, cage.shape.faces, points):
         digest.update(str(array.shape).encode())
         digest.update(np.ascontiguousarray(array).tobytes())

@@ -1,4 +1,10 @@
-"""Fixed points in a cage: a stored table of weights, and its products with motions."""
+"""Fixed points in a cage: a stored table of weights, and its products with motions.
+
+Weights may be kept in single precision; products and their sums are of doubles all the same, and
+the transpose is that of the weights as they are kept.
+"""
+
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,6 +27,9 @@ SPARSE = 0.35
 THREAD_WORTH = 512
 """Blocks of points that are worth a thread of their own."""
 
+KINDS: dict[str, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}
+"""What weights are kept in, by the name of the precision."""
+
 
 class DenseTable(AbstractEmbedding):
     """Points with the weights of all control points.
@@ -40,8 +49,7 @@ class DenseTable(AbstractEmbedding):
     @override
     def displaced(self, moves: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
         out = empty(self.points.shape)
-        start = np.empty((0, 3)) if rest is None else rest
-        given = self.blocks, np.ascontiguousarray(moves), start, out
+        given = self.blocks, np.ascontiguousarray(moves), _or_empty(rest), out
         spread(table_loops.forward, len(self.blocks), *given, least=THREAD_WORTH)
         return out
 
@@ -54,7 +62,7 @@ class DenseTable(AbstractEmbedding):
 
     @override
     def matrix(self) -> scipy.sparse.csr_array:
-        return scipy.sparse.csr_array(self._whole())
+        return scipy.sparse.csr_array(self._whole(), dtype=float)
 
     def _whole(self) -> np.ndarray:
         rows = self.blocks.transpose(0, 2, 1).reshape(-1, self.count)
@@ -76,18 +84,23 @@ class SparseTable(AbstractEmbedding):
     @override
     def displaced(self, moves: np.ndarray, rest: np.ndarray | None) -> np.ndarray:
         out = empty(self.points.shape)
-        out[:] = self.weights @ moves
-        if rest is not None:
-            out += rest
+        given = *self._entries(), np.ascontiguousarray(moves), _or_empty(rest), out
+        spread(table_loops.forward_sparse, len(out), *given, least=THREAD_WORTH * WIDTH)
         return out
 
     @override
     def gathered(self, vectors: np.ndarray) -> np.ndarray:
-        return self.weights.T @ vectors
+        totals = np.zeros((cores(), self.count, 3))
+        given = *self._entries(), np.ascontiguousarray(vectors), totals
+        spread(table_loops.backward_sparse, len(vectors), *given, least=THREAD_WORTH * WIDTH)
+        return totals.sum(axis=0)
 
     @override
     def matrix(self) -> scipy.sparse.csr_array:
-        return self.weights
+        return self.weights.astype(float, copy=False)
+
+    def _entries(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.weights.data, self.weights.indices, self.weights.indptr
 
     def _field(self, moves: Array) -> Array:
         entries = self.weights.tocoo()
@@ -95,9 +108,13 @@ class SparseTable(AbstractEmbedding):
         return jnp.zeros((len(self.points), 3)).at[entries.row].add(shares)
 
 
-def blocked(count: int, columns: int) -> np.ndarray:
+def _or_empty(rest: np.ndarray | None) -> np.ndarray:
+    return np.empty((0, 3)) if rest is None else rest
+
+
+def blocked(count: int, columns: int, kind: type[np.floating[Any]]) -> np.ndarray:
     """An empty dense table, its last points zero."""
-    blocks = np.empty((-(-count // WIDTH), columns, WIDTH))
+    blocks = empty((-(-count // WIDTH), columns, WIDTH), kind)
     blocks[-1:] = 0.0
     return blocks
 

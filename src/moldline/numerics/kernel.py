@@ -50,12 +50,12 @@ def _as_argument(array: Any) -> Any:
     return array if isinstance(array, (jax.Array, np.ndarray)) else jnp.asarray(array)
 
 
-def empty(shape: tuple[int, ...]) -> np.ndarray:
-    """Uninitialised float64, aligned so that JAX takes it over without a copy."""
-    size = 8 * int(np.prod(shape))
+def empty(shape: tuple[int, ...], kind: type[np.floating[Any]] = np.float64) -> np.ndarray:
+    """Uninitialised, aligned so that JAX takes it over without a copy."""
+    size = np.dtype(kind).itemsize * int(np.prod(shape))
     raw = np.empty(size + 64, np.uint8)
     start = -raw.ctypes.data % 64
-    return raw[start : start + size].view(np.float64).reshape(shape)
+    return raw[start : start + size].view(kind).reshape(shape)
 
 
 def shared(array: np.ndarray) -> jax.Array:

@@ -1,4 +1,7 @@
-"""Compiled products of a table of weights with motions, several points at a time."""
+"""Compiled products of a table of weights with motions, dense and sparse.
+
+Weights in single precision become double ones as they are read, so that sums are of doubles.
+"""
 
 import numba
 import numpy as np
@@ -67,3 +70,32 @@ def backward(blocks, vectors, total, part, start, stop):
             own[j, 0] += sx
             own[j, 1] += sy
             own[j, 2] += sz
+
+
+@_fast
+def forward_sparse(weights, columns, starts, moves, rest, out, part, start, stop):
+    """Motion of points from that of the cage, by the weights of each that are not zero."""
+    for n in range(start, stop):
+        x, y, z = 0.0, 0.0, 0.0
+        for e in range(starts[n], starts[n + 1]):
+            w, j = weights[e], columns[e]
+            x += w * moves[j, 0]
+            y += w * moves[j, 1]
+            z += w * moves[j, 2]
+        if len(rest):
+            out[n, 0], out[n, 1], out[n, 2] = rest[n, 0] + x, rest[n, 1] + y, rest[n, 2] + z
+        else:
+            out[n, 0], out[n, 1], out[n, 2] = x, y, z
+
+
+@_fast
+def backward_sparse(weights, columns, starts, vectors, total, part, start, stop):
+    """The transpose, one total for each part."""
+    own = total[part]
+    for n in range(start, stop):
+        x, y, z = vectors[n, 0], vectors[n, 1], vectors[n, 2]
+        for e in range(starts[n], starts[n + 1]):
+            w, j = weights[e], columns[e]
+            own[j, 0] += w * x
+            own[j, 1] += w * y
+            own[j, 2] += w * z

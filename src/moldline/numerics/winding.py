@@ -25,9 +25,7 @@ def winding(
 
 
 def winding_in_jax(
-    points: Float[Array, "n 3"],
-    corners: Float[np.ndarray, "m 3"],
-    faces: Int[np.ndarray, "t 3"],
+    points: Float[Array, "n 3"], corners: Float[Array, "m 3"], faces: Int[Array, "t 3"]
 ) -> Float[Array, "n"]:
     """The same for traced points."""
     a, b, c = (corners[faces[:, i]] - points[:, None] for i in range(3))

@@ -118,6 +118,10 @@ def map_slopes(deformer: AbstractDeformer, points: Points, controls: Vector) -> 
 
     Three forward derivatives do for all points, since each moves by itself.
     """
-    _, push = jax.linearize(lambda p: deformer.follow(p, controls), jnp.asarray(points))
-    columns = [push(jnp.zeros_like(points).at[:, i].set(1.0)) for i in range(3)]
-    return jnp.stack(columns, axis=2)
+    points = jnp.asarray(points)
+
+    def pushed(axis: Float[Array, "3"]) -> Points:
+        along = jnp.broadcast_to(axis, points.shape)
+        return jax.jvp(lambda p: deformer.follow(p, controls), (points,), (along,))[1]
+
+    return jax.vmap(pushed, out_axes=2)(jnp.eye(3))

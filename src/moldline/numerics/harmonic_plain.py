@@ -35,6 +35,7 @@ class Tables(NamedTuple):
     faces: Any
 
 
+@jax.jit
 def looked_up(tables: Tables, points: Float[Array, "n 3"]) -> Float[Array, "n m"]:
     """Weights of the cage's corners at points, in batches that bound the memory."""
     count, columns = len(points), tables.values.shape[1]

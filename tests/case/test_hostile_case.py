@@ -55,10 +55,53 @@ def example() -> str:
     return re.sub(r"[ \t]*#.*", "", text)
 
 
+PILOTS = """
+moldline = 1
+[geometry.wing]
+file = "wing.tri"
+[variable.v]
+size = 2
+[[stage]]
+deformer = "pilots"
+margin = 0.2
+weights = 1.0
+step = 1.0
+[stage.hidden]
+deformer = "lattice"
+shape = [3, 2, 2]
+[stage.pilot.up]
+measure = "position"
+spot = { vertex = 3 }
+along = "z"
+[stage.pilot.aft]
+measure = "position"
+spot = { near = [30.0, 30.0, 7.0] }
+along = "x"
+[stage.constraint.thick]
+measure = "separation"
+start = { vertex = 5 }
+end = { vertex = 2 }
+bounds = [0.1, inf]
+weight = 2.0
+[stage.constraint.tail]
+measure = "fixed"
+region = { near = [60.0, 30.0, 4.0], radius = 3.0 }
+[[stage.link]]
+variable = "v"
+link = "controls"
+[measure.volume]
+measure = "volume"
+bounds = [1.0, 1e6]
+[measure.clear]
+measure = "clearance"
+other = "wing.tri"
+"""
+
+
 @st.composite
-def hostile(draw: st.DrawFn) -> str:
-    """The example with one to three values or lines changed, or cut."""
-    lines = example().splitlines()
+def hostile(draw: st.DrawFn, text: str) -> str:
+    """A case with one to three values or lines changed, or cut."""
+    lines = text.strip().splitlines()
     for _ in range(draw(st.integers(1, 3))):
         at = draw(st.integers(0, len(lines) - 1))
         kind = draw(st.sampled_from(["value", "value", "value", "line", "gone", "twice", "cut"]))
@@ -105,8 +148,16 @@ def loaded_or_refused(path: Path) -> Case | None:
 
 
 @quick
-@given(text=hostile())
+@given(text=hostile(example()))
 def test_a_hostile_case_is_a_case_or_refused_with_its_place(folder, text):
+    path = folder / "case.toml"
+    path.write_bytes(text.encode())
+    loaded_or_refused(path)
+
+
+@settings(quick, max_examples=40)
+@given(text=hostile(PILOTS))
+def test_a_hostile_case_of_pilots_is_a_case_or_refused_with_its_place(folder, text):
     path = folder / "case.toml"
     path.write_bytes(text.encode())
     loaded_or_refused(path)
@@ -114,7 +165,7 @@ def test_a_hostile_case_is_a_case_or_refused_with_its_place(folder, text):
 
 @pytest.mark.slow
 @settings(quick, max_examples=10_000, derandomize=False)
-@given(text=hostile())
+@given(text=hostile(example()))
 def test_ten_thousand_hostile_cases_are_cases_or_refused(folder, text):
     path = folder / "case.toml"
     path.write_bytes(text.encode())

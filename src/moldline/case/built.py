@@ -1,5 +1,6 @@
 """Deformers and measures from the tables of a case file, one within another."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -16,46 +17,49 @@ from .options import DeformerTable, MeasureTable
 
 def deformer(file: str, where: str, table: Any, geometry: Geometry) -> AbstractDeformer:
     """From a table with its name under `deformer` and its own options beside it."""
-    return _built(file, where, registry.deformer(table.deformer), table.deformer, table, geometry)
+    return _built(file, where, registry.deformer, table.deformer, table, geometry)
 
 
 def measure(
     file: str, where: str, table: MeasureTable, geometry: Geometry
 ) -> AbstractMeasure | Constraint:
     """From a table with its name under `measure`; a constraint where it has bounds."""
-    cls = registry.measure(table.measure)
-    made = _built(file, where, cls, table.measure, table, geometry)
+    made = _built(file, where, registry.measure, table.measure, table, geometry)
     if table.bounds is None:
         return made
     lower, upper = np.asarray(table.bounds, float).reshape(-1, 2).T
-    return Constraint(made, lower, upper, table.weight)
+    try:
+        return Constraint(made, lower, upper, table.weight)
+    except MoldlineError as error:
+        raise CaseError(f"{file}: {where}: {error}") from None
 
 
-def relocated(table: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """A deformer's or measure's table for a case file elsewhere: its paths from `folder`."""
-    if isinstance(table.get("deformer"), str):
-        cls = registry.deformer(table["deformer"])
-    elif isinstance(table.get("measure"), str):
-        cls = registry.measure(table["measure"])
-    else:
-        return {key: _relocated(value, folder) for key, value in table.items()}
-    names = options.paths(cls).keys()
+def relocated(value: Any, folder: Path) -> Any:
+    """Tables of deformers and measures for a case file elsewhere: their paths from `folder`."""
+    if isinstance(value, list):
+        return [relocated(one, folder) for one in value]
+    if not isinstance(value, dict):
+        return value
+    names = _paths(value)
     return {
-        key: str((folder / value).resolve())
-        if key in names and value is not None
-        else _relocated(value, folder)
-        for key, value in table.items()
+        key: str((folder / one).resolve()) if key in names else relocated(one, folder)
+        for key, one in value.items()
     }
 
 
-def _relocated(value: Any, folder: Path) -> Any:
-    if isinstance(value, list):
-        return [_relocated(one, folder) for one in value]
-    return relocated(value, folder) if isinstance(value, dict) else value
+def _paths(table: dict[str, Any]) -> set[str]:
+    """Keys of a deformer's or measure's table that hold paths."""
+    for key, find in (("deformer", registry.deformer), ("measure", registry.measure)):
+        if isinstance(name := table.get(key), str):
+            return {key for key in options.paths(find(name)) if table.get(key) is not None}
+    return set()
 
 
-def _built(file: str, where: str, cls: Any, name: str, table: Any, geometry: Geometry) -> Any:
+def _built(
+    file: str, where: str, find: Callable[[str], Any], name: str, table: Any, geometry: Geometry
+) -> Any:
     try:
+        cls = find(name)
         model = options.of_class(name, cls)
         given = schema.checked(model, table.model_extra or {}, file, where)
         known = options.paths(cls) | given

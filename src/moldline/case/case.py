@@ -83,7 +83,7 @@ class Case:
 
     def save(self, path: str | os.PathLike[str], values: Mapping[str, Any] | None = None) -> None:
         """Write the case file, with new values where given; it then reads back as this case."""
-        tables = self.tables.model_dump(exclude_unset=True, mode="json")
+        tables = self.tables.model_dump(exclude_unset=True)
         for name, value in (values or {}).items():
             checked = self.pipeline.variables[name].checked(np.asarray(value, float))
             tables["variable"][name]["value"] = np.asarray(checked).tolist()

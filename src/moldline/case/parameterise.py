@@ -14,8 +14,10 @@ from .. import registry
 from ..deformers.posed import AbstractPosed
 from ..errors import GeometryError, ParameterError
 from ..mesh import Geometry, Section, Surface
+from ..mesh.enclosure import part_of
 from ..mesh.io import read, write
 from ..mesh.io.files import replacing
+from ..mesh.symmetric import is_half
 from ..parameters.variable import UNITS
 from .case import Case, load
 
@@ -157,6 +159,7 @@ def wing_lattice(
     geometry: Geometry, *, shape: tuple[int, int, int] | None = None, **options: Any
 ) -> Draft:
     """A swept, tapered box along a wing; stations rise, and sections move up and grow thicker."""
+    geometry = _surface(geometry, "a wing's own box is fitted to a surface")
     counts = shape or (7, 5, 2)
     made = registry.deformer("control_volume").build(geometry, wing=True, shape=counts, **options)
     draft = Draft(
@@ -170,26 +173,46 @@ def wing_lattice(
 
 
 def cage(maker: str) -> Callable[..., Draft]:
-    """A kind of cage; its vertices move along the axes of space."""
+    """A kind of cage; its vertices move along the axes of space.
+
+    Around a half model it is symmetric and moves so, or points on the plane would leave it.
+    """
 
     def drafted(geometry: Geometry, **options: Any) -> Draft:
-        if not isinstance(geometry, Surface):
-            raise GeometryError(f"a cage goes around a surface, got a {type(geometry).__name__}")
+        geometry = _surface(geometry, "a cage goes around a surface")
+        half = is_half(part_of(geometry, options.get("component"))[0])
+        if half:
+            options["symmetric"] = True
         made = getattr(registry.deformer("cage"), maker)(geometry, **options)
-        count = len(made.rest)
         draft = Draft(
             {"deformer": "cage"},
-            f"{count} vertices and {len(made.shape.faces)} triangles around the geometry, each "
-            "vertex moving along x, y and z; its effect fades in a few edges",
+            f"{len(made.rest)} vertices and {len(made.shape.faces)} triangles around the geometry"
+            + (" and its mirror image; those at y < 0 follow the others" if half else "")
+            + "; each vertex moves along x, y and z, its effect fades in a few edges",
             beside={"_cage.obj": Surface(made.rest, made.shape.faces)},
         )
         edges = made.rest[made.lines[:, 0]] - made.rest[made.lines[:, 1]]
         step = BOUND * float(np.median(np.linalg.norm(edges, axis=1)))
         for axis in "xyz":
-            draft.add(f"move_{axis}", {"link": "each", "axis": axis}, count, step, "m")
+            link: dict[str, Any] = {"link": "each", "axis": axis}
+            free = np.arange(len(made.rest))
+            if half:
+                y = made.rest[:, 1]
+                free = np.flatnonzero(y > 0 if axis == "y" else y >= 0)
+                link |= {"index": free[:, None].tolist(), "mirrored": "y"}
+            draft.add(f"move_{axis}", link, len(free), step, "m")
         return draft
 
     return drafted
+
+
+def _surface(geometry: Geometry, need: str) -> Surface:
+    if not isinstance(geometry, Surface):
+        raise GeometryError(
+            f"{need}, got a {type(geometry).__name__}; write its boundary or stitched patches with "
+            "moldline convert first"
+        )
+    return geometry
 
 
 def _section_lattice(shape: tuple[int, int, int]) -> Draft:
@@ -207,8 +230,7 @@ def posed(name: str) -> Callable[..., Draft]:
     """A kind whose parameters have names and measure something: the skeletons."""
 
     def drafted(geometry: Geometry, **options: Any) -> Draft:
-        if not isinstance(geometry, Surface):
-            raise GeometryError(f"a {name.replace('_', ' ')} needs a surface of triangles")
+        geometry = _surface(geometry, f"a {name.replace('_', ' ')} needs a surface of triangles")
         deformer: AbstractPosed = registry.deformer(name).build(geometry, **options)
         draft = Draft({"deformer": name, **_plain(options)}, "")
         for parameter, numbers in deformer.parameters.items():

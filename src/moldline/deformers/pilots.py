@@ -226,7 +226,7 @@ class Pilots(AbstractPosed):
         still = read(jax.lax.stop_gradient(points))
         return self.net, self._solved(read(points), still, jnp.asarray(controls)).x
 
-    def marks(self, points: Points) -> Points:
+    def marks(self, points: Points) -> Array:
         """Where the places are that the pilots hold, for pictures."""
         few = [m for m in self.pilots.values() if len(m.reads) <= SHOWN]
         return jnp.concatenate([m.marks(jnp.asarray(points)[m.reads]) for m in few])

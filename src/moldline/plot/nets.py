@@ -71,6 +71,8 @@ def draw_net(
 def _draw_lines(
     axes: Axes, flat: np.ndarray, lines: Any, colour: str, width: float, style: Any
 ) -> None:
+    if not len(lines):
+        return
     ends = flat[np.asarray(lines)]
     drawn = LineCollection(
         list(ends[..., :2]),

@@ -186,6 +186,16 @@ def test_pilots_in_one_cell_of_too_coarse_a_lattice_are_named(body):
     assert max(fine.net.shape) > 2
 
 
+def test_pilots_nearer_than_the_control_points_strain_them(body, lattice):
+    face = next(face for face in np.asarray(body.faces) if 2 in face)
+    beside = Spot.within(face, np.where(face == 2, 0.98, 0.01))
+    near = {"a": Position(V(2), "z"), "b": Position(beside, "z")}
+    pilots = Pilots(body, near, hidden=lattice)
+    together, apart = (pilots.report(np.array(c)) for c in ([0.1, 0.1], [0.1, -0.1]))
+    assert together.status == apart.status == "met"
+    assert together.strain < 5 < 30 < apart.strain
+
+
 def test_bounds_hold_and_let_go(body, lattice):
     bounds = {
         "keel": Constraint(Position(V(5), "z"), lower=-0.75, upper=-0.65),

@@ -21,8 +21,9 @@ from .base import AbstractDeformer
 from .chain import Chain
 from .conditions import Conditions, conditions
 from .hidden import automatic
+from .net import AbstractControlNet
 from .posed import AbstractPosed
-from .readings import Readings
+from .readings import FEW, Readings
 from .second_order import smallest_curvature
 
 TOLERANCE = 1e-12
@@ -69,6 +70,9 @@ class PilotReport(NamedTuple):
     curvature
         How much the cost grows at least, per cost of a motion that keeps all conditions: 1 where
         they are linear, 0 or less where the shape is not the one of least cost nearby.
+    strain
+        Largest motion of a hidden control point, per largest motion of a point that is read: much
+        above 1 where pilots are nearer to each other than the control points are; 0 of others.
     """
 
     status: str
@@ -78,6 +82,7 @@ class PilotReport(NamedTuple):
     dependent: tuple[str, ...]
     iterations: int
     curvature: float
+    strain: float
 
 
 class Pilots(AbstractPosed):
@@ -259,7 +264,19 @@ class Pilots(AbstractPosed):
             asked.dependent,
             int(solution.iterations),
             curvature,
+            self._strain(solution.x, self.rest if points is None else points),
         )
+
+    def _strain(self, controls: Array, shape: Points) -> float:
+        few = [measure.reads for measure in self.measures if len(measure.reads) <= FEW]
+        reads = np.unique(np.concatenate([*few, []]).astype(int))
+        if not isinstance(self.net, AbstractControlNet) or not len(reads):
+            return 0.0
+        rest = np.asarray(shape)[reads]
+        motion = np.linalg.norm(np.asarray(self.net.follow(rest, controls)) - rest, axis=1).max()
+        moves = np.asarray(self.net.moves(controls)).reshape(-1, 3)
+        largest = np.linalg.norm(moves, axis=1).max()
+        return float(largest / motion) if motion > 0 else 0.0
 
     def _status(self, solution: Solution, misses_some: bool, curvature: float) -> str:
         if not float(solution.size) <= SETTLED:

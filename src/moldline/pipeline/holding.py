@@ -11,6 +11,10 @@ MOST_NAMES = 6
 """Names that a sentence lists."""
 
 
+STRAINED = 30.0
+"""Control points that move this many times as far as what they hold are too few."""
+
+
 @dataclass(frozen=True)
 class Holding:
     """How well a stage's pilots and constraints are met.
@@ -57,7 +61,12 @@ class Holding:
                 f"! unmet: {_listed(found.unmet)}; they contradict each other, or the hidden "
                 "deformer is too coarse for them: give it more control points, or drop one"
             )
-        elif found.dependent:
+        elif found.strain > STRAINED:
+            lines.append(
+                f"! hidden control points move {found.strain:.3g} times as far as what is held: "
+                "pilots are too near to each other for them; give more of them, or fewer pilots"
+            )
+        if found.dependent and not found.unmet:
             lines.append(f"implied by others: {_listed(found.dependent)}")
         if found.status == "not converged":
             lines.append("! ask for less at once, or for smaller steps: step = 0.5")
@@ -75,6 +84,7 @@ class Holding:
             "status": found.status,
             "iterations": found.iterations,
             "curvature": found.curvature,
+            "strain": found.strain,
             "misses": {name: miss.tolist() for name, miss in found.misses.items()},
             "unmet": list(found.unmet),
             "active": list(found.active),

@@ -51,12 +51,14 @@ def draw_net(
     """
     shown = View.of(view)
     flat = shown.project(rest)
+    colour, width = (GREY, 0.4) if is_hidden else (DARK, 0.8)
     if moved is None:
-        _draw_lines(axes, flat, lines, DARK, 0.5, "-")
+        _draw_lines(axes, flat, lines, colour, min(width, 0.5), "-")
     else:
-        _draw_lines(axes, flat, lines, GREY, 0.5, DASHES)
+        if not is_hidden:
+            _draw_lines(axes, flat, lines, GREY, 0.5, DASHES)
         flat = shown.project(moved)
-        _draw_lines(axes, flat, lines, DARK, 0.8, "-")
+        _draw_lines(axes, flat, lines, colour, width, "-")
     right, up, depth = flat.T
     if not is_hidden:
         axes.scatter(right, up, s=13, color=_faded(RED, depth), zorder=4, linewidths=0)

@@ -193,7 +193,7 @@ def test_pilots_nearer_than_the_control_points_strain_them(body, lattice):
     pilots = Pilots(body, near, hidden=lattice)
     together, apart = (pilots.report(np.array(c)) for c in ([0.1, 0.1], [0.1, -0.1]))
     assert together.status == apart.status == "met"
-    assert together.strain < 5 < 30 < apart.strain
+    assert together.strain < 4 < 10 < apart.strain
 
 
 def test_bounds_hold_and_let_go(body, lattice):

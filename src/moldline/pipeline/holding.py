@@ -11,7 +11,7 @@ MOST_NAMES = 6
 """Names that a sentence lists."""
 
 
-STRAINED = 30.0
+STRAINED = 10.0
 """Control points that move this many times as far as what they hold are too few."""
 
 

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from ..mesh import Geometry, Surface
     from ..mesh.health import Health
     from ..mesh.parts import Part
+    from ..pipeline.examine import Proof
+    from ..pipeline.holding import Holding
     from ..pipeline.pipeline import Pipeline
 
 MOST_PARTS = 10
@@ -180,11 +182,7 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
     )  # fmt: skip
     lines = [
         *(f"embedding    {one}" for one in embedded),
-        *(
-            f"{'  ' if i else 'pilots       '}{line}"
-            for one in held
-            for i, line in enumerate(one.sentences())
-        ),
+        *_held(held),
         f"deformation  smallest Jacobian determinant {fold.smallest:.4g} at "
         f"({x:.4g}, {y:.4g}, {z:.4g}), {fold.at_points:.4g} on the mesh; "
         f"{fold.samples} places looked at",
@@ -201,16 +199,27 @@ def _deformation(pipeline: "Pipeline", chosen: dict[str, Any]) -> Told:
         "turned_faces": [int(face) for face in turned[:10]],
         "inverted_cells": [int(cell) for cell in inverted[:10]],
         "tears": [asdict(tear) for tear in torn],
-        "derivatives": {
-            "method": proof.method,
-            "order": None if proof.forward.is_linear else proof.forward.order,
-            "is_linear": proof.forward.is_linear,
-            "remainders": list(proof.forward.sizes),
-            "steps": list(proof.forward.steps),
-            "mismatch": proof.mismatch,
-            "is_right": proof.is_right,
-        },
+        "derivatives": _proof(proof),
     }
     is_whole = not (fold.folds or torn or len(turned) or len(inverted))
     is_sound = is_whole and proof.is_right and all(one.is_met for one in held)
     return report, lines, is_sound
+
+
+def _held(held: "list[Holding]") -> list[str]:
+    lines = []
+    for first, *more in (one.sentences() for one in held):
+        lines += [f"pilots       {first}", *(f"  {line}" for line in more)]
+    return lines
+
+
+def _proof(proof: "Proof") -> dict[str, Any]:
+    return {
+        "method": proof.method,
+        "order": None if proof.forward.is_linear else proof.forward.order,
+        "is_linear": proof.forward.is_linear,
+        "remainders": list(proof.forward.sizes),
+        "steps": list(proof.forward.steps),
+        "mismatch": proof.mismatch,
+        "is_right": proof.is_right,
+    }

@@ -26,8 +26,8 @@ def made(tmp_path, capsys, *options, source=WING):
 KINDS = {
     "lattice": (["--shape", "5x4x2"], 3 * 40, "5 x 4 x 2 control points: as asked for"),
     "wing-lattice": (["--shape", "5x4x2"], 40, "the wing's own box"),
-    "cage": (["--faces", "80"], 3 * 42, "42 vertices and 80 triangles"),
-    "wing-cage": (["--stations", "3"], 3 * 26, "26 vertices"),
+    "cage": (["--faces", "80"], 24 + 17 + 24, "41 vertices and 78 triangles"),
+    "wing-cage": (["--stations", "3"], 25 + 17 + 25, "42 vertices"),
     "wing-skeleton": (["--stations", "0,11,29"], 1 + 3 + 2 + 2 + 3, "11 numbers: 1 of span"),
 }
 
@@ -43,6 +43,81 @@ def test_each_kind_writes_a_case_that_leaves_the_wing_as_it_is(kind, tmp_path, c
     text = (tmp_path / "case.toml").read_text()
     assert words.split(":")[0] in text  # a person reads why
     assert tomllib.loads(text)["geometry"]["transport_wing"]["file"] == "transport_wing.tri"
+
+
+@pytest.mark.parametrize("kind", ["cage", "wing-cage"])
+def test_a_half_model_stays_on_its_plane_of_symmetry(kind, tmp_path, capsys):
+    case, told = made(tmp_path, capsys, "--kind", kind)
+    assert "around the geometry and its mirror image; those at y < 0 follow the others" in told
+    rest, rng = np.asarray(case.pipeline.geometry.points), np.random.default_rng(0)
+    values = {n: rng.uniform(-1, 1, v.size) for n, v in case.pipeline.variables.items()}
+    moved, on = np.asarray(case.pipeline.points(values)), rest[:, 1] == 0
+    assert np.array_equal(moved[on, 1], rest[on, 1]) and on.sum() > 100
+    assert np.abs(moved - rest)[on].max() > 0.1 and np.abs(moved - rest)[:, 1].max() > 0.05
+    stage = case.pipeline.stages[0]
+    cage, controls = stage.deformer, np.asarray(stage.controls(case.pipeline.values(values)))
+    flip = np.array([1.0, -1.0, 1.0])  # the whole model keeps its symmetry
+    there = np.asarray(cage.follow(rest * flip, controls))
+    np.testing.assert_allclose(there, moved * flip, rtol=0, atol=1e-9)
+
+
+def test_a_body_cut_at_its_plane_gets_a_symmetric_cage(tmp_path, capsys):
+    body = fuselage(48, 81)
+    points, faces = np.array(body.points), np.asarray(body.faces)
+    points[np.abs(points[:, 1]) < 1e-9, 1] = 0.0
+    half = ml.Surface(points, faces[np.all(points[faces, 1] >= 0, axis=1)])
+    (tmp_path / "in").mkdir()
+    ml.write(tmp_path / "in/half.tri", half)
+    case, told = made(tmp_path, capsys, "--kind", "body-cage", source=tmp_path / "in/half.tri")
+    assert "its mirror image" in told
+    values = {n: np.full(v.size, 0.1) for n, v in case.pipeline.variables.items()}
+    moved, rest = (
+        np.asarray(case.pipeline.points(values)),
+        np.asarray(case.pipeline.geometry.points),
+    )
+    assert np.all(moved[rest[:, 1] == 0, 1] == 0) and np.any(moved != rest)
+
+
+def test_the_picture_shows_the_shape_once_with_its_control_points(tmp_path, capsys, monkeypatch):
+    drawn = []
+    monkeypatch.setattr("moldline.plot.save", lambda figure, path: drawn.append(figure))
+    for kind in ("lattice", "wing-skeleton"):
+        words = ["parameterise", str(WING), "--kind", kind, "--overwrite"]
+        assert main([*words, "-o", str(tmp_path / "case.toml")]) == 0
+        (axes,) = drawn.pop().axes
+        assert [type(one).__name__ for one in axes.collections] == [
+            "PolyCollection", "LineCollection", "PathCollection",
+        ]  # fmt: skip
+
+
+def test_a_wing_skeleton_turns_its_sections_on_request(tmp_path, capsys):
+    places = ["--sweep-at", "0.25", "--twist-at", "0.25"]
+    case, _ = made(tmp_path, capsys, "--kind", "wing-skeleton", "--sections", "turned", *places)
+    stage = tomllib.loads((tmp_path / "case.toml").read_text())["stage"][0]
+    assert (stage["sections"], stage["sweep_at"], stage["twist_at"]) == ("turned", 0.25, 0.25)
+    skeleton = ml.WingSkeleton.fitted(case.pipeline.geometry, sections="turned", sweep_at=0.25)
+    np.testing.assert_allclose(
+        case.pipeline.variables["sweep"].value, np.degrees(skeleton.sweep), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize(
+    ("kind", "need"),
+    [
+        ("cage", "a cage goes around a surface"),
+        ("wing-cage", "a cage goes around a surface"),
+        ("wing-lattice", "a wing's own box is fitted to a surface"),
+        ("wing-skeleton", "a wing skeleton needs a surface of triangles"),
+        ("body-skeleton", "a body skeleton needs a surface of triangles"),
+    ],
+)
+def test_a_file_without_triangles_is_sent_to_convert(kind, need, tmp_path, capsys):
+    np.savetxt(tmp_path / "foil.dat", [[1, 0], [0.5, 0.1], [0, 0], [0.5, -0.1], [1, 0]])
+    words = ["parameterise", str(tmp_path / "foil.dat"), "--kind", kind]
+    assert main([*words, "-o", str(tmp_path / "case.toml")]) == 1
+    told = capsys.readouterr().err
+    assert f"{need}, got a Section; write its boundary or stitched patches with moldline" in told
+    assert [file.name for file in tmp_path.iterdir()] == ["foil.dat"]
 
 
 def test_a_body_gets_a_skeleton_or_rings(tmp_path, capsys):
@@ -79,6 +154,8 @@ def test_what_is_there_is_not_written_over(tmp_path, capsys):
     ("options", "message"),
     [
         (["--kind", "cage", "--shape", "3x3x3"], "cage takes no shape"),
+        (["--kind", "body-skeleton", "--sections", "turned"], "body-skeleton takes no sections"),
+        (["--kind", "wing-skeleton", "--sections", "turned"], "give sweep_at and twist_at alike"),
         (["--kind", "lattice", "--shape", "3,3,3"], "expected three counts, such as 7x4x2"),
         (["--kind", "lattice", "--region", "1,2,3"], "expected six numbers, x,y,z,x,y,z"),
         (["--kind", "cage", "--faces", "3"], "20 faces or more"),

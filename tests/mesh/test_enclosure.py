@@ -128,3 +128,47 @@ def test_a_cage_made_around_a_body_moves_it():
         np.testing.assert_allclose(moved, body.points + np.array([0.1, 0.2, 0.3]), atol=1e-9)
     swept = supersonic_wing(21, 15)
     assert len(ml.Cage.around_wing(swept, 3, 4).rest) == 3 * 8 + 2
+
+
+def half(surface):
+    """The triangles of a symmetric surface at y >= 0, its points moved onto the plane there."""
+    points, faces = np.array(surface.points), np.asarray(surface.faces)
+    points[np.abs(points[:, 1]) < 1e-12, 1] = 0.0
+    kept, index = np.unique(faces[np.all(points[faces, 1] >= 0, axis=1)], return_inverse=True)
+    return ml.Surface(points[kept], index.reshape(-1, 3))
+
+
+HALVES = {
+    "ball": lambda ball: enclosure(half(ball), 120, 0.06, symmetric=True),
+    "few": lambda ball: enclosure(half(ball), 24, 0.1, symmetric=True),
+    "wing": lambda ball: enclosure(supersonic_wing(21, 15), 150, 0.05, symmetric=True),
+    "other side": lambda ball: enclosure(
+        ml.Surface(half(ball).points * np.array([1.0, -1.0, 1.0]), half(ball).faces),
+        100, 0.05, symmetric=True,
+    ),
+    "wing rings": lambda ball: wing_rings(supersonic_wing(21, 15), 4, 5, symmetric=True),
+    "body": lambda ball: enclosure(half(fuselage(48, 81)), 100, 0.05, symmetric=True),
+    "body rings": lambda ball: body_rings(half(fuselage(48, 81)), 6, 8, symmetric=True),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", HALVES)
+def test_a_symmetric_cage_is_its_own_image_to_the_bit(name, ball):
+    found = HALVES[name](ball)
+    points, faces = np.asarray(found.surface.points), np.asarray(found.surface.faces)
+    assert health(found.surface).is_sound and found.clearance > 0
+    places = {tuple(p): n for n, p in enumerate(points.tolist())}
+    image = np.array([places[tuple(p)] for p in (points * [1.0, -1.0, 1.0] + 0.0).tolist()])
+
+    def turning(triangles):
+        first = triangles.argmin(axis=1)[:, None]
+        return {*map(tuple, np.take_along_axis(triangles, (first + [0, 1, 2]) % 3, 1).tolist())}
+
+    assert turning(image[faces][:, ::-1]) == turning(faces)
+    if name == "ball":
+        assert 90 < len(faces) < 150
+
+
+def test_a_symmetric_ring_has_as_many_points_on_either_side():
+    with pytest.raises(ParameterError, match="an even number where it is symmetric, got 7"):
+        body_rings(half(fuselage(48, 81)), 6, 7, symmetric=True)

@@ -3,9 +3,14 @@
 import argparse
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import values
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..pipeline.pipeline import Pipeline
 
 HELP = "Write a case file to begin with for a geometry, and a picture of it."
 EXAMPLE = """\
@@ -13,6 +18,8 @@ EXAMPLE = """\
   moldline parameterise wing.tri --kind lattice --region 24,3,2,30,8,6 -o case.toml
   moldline parameterise wing.tri --kind wing-lattice --shape 7x5x2 -o case.toml
   moldline parameterise wing.tri --kind wing-skeleton --stations 4 -o case.toml
+  moldline parameterise wing.tri --kind wing-skeleton --sections turned \
+      --sweep-at 0.25 --twist-at 0.25 -o case.toml
   moldline parameterise body.stl --kind cage --faces 150 --offset 0.05 -o case.toml"""
 
 KINDS = (
@@ -41,6 +48,23 @@ def configure(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--stations", help="wings and bodies: how many, or their places: 4, or 0,10,25"
     )
+    command.add_argument(
+        "--sections",
+        choices=("streamwise", "turned"),
+        help="wing-skeleton: do sections stay in their planes, or turn with sweep and dihedral",
+    )
+    command.add_argument(
+        "--sweep-at",
+        type=float,
+        metavar="SHARE",
+        help="wing-skeleton: of the chord, where sweep is",
+    )
+    command.add_argument(
+        "--twist-at",
+        type=float,
+        metavar="SHARE",
+        help="wing-skeleton: of the chord, where dihedral and twist are",
+    )
     command.add_argument("--faces", type=int, help="cage: about how many triangles")
     command.add_argument(
         "--offset", type=float, help="cages: distance from the geometry, as a part of its size"
@@ -52,8 +76,7 @@ def run(given: argparse.Namespace) -> int:
     """Do it."""
     from ..case.parameterise import parameterise
     from ..errors import FileError
-    from ..plot import of_deformation
-    from ..plot.figure import save
+    from ..plot import save
 
     picture = given.output.with_suffix(".png")
     for path in (given.output, picture):
@@ -61,15 +84,30 @@ def run(given: argparse.Namespace) -> int:
             raise FileError(f"{path}: is there already; choose another name, or --overwrite")
     options = {"component": given.component, "align": given.align, "faces": given.faces}
     options |= {"offset": given.offset, "shape": _shape(given.shape), "region": _region(given)}
-    options["stations"] = _stations(given.stations)
+    options |= {"stations": _stations(given.stations), "sections": given.sections}
+    options |= {"sweep_at": given.sweep_at, "twist_at": given.twist_at}
     case, why = parameterise(given.source, given.output, given.kind, units=given.units, **options)
-    save(of_deformation(case.pipeline, title=given.source.stem.replace("_", " ")), picture)
+    save(_picture(case.pipeline, given.source.stem.replace("_", " ")), picture)
     print(why)
     for variable in case.pipeline.variables.values():
         size = f"{variable.size} number{'s' * (variable.size > 1)}"
         print(f"  {variable.name:16} {size} [{variable.unit}]")
     print(f"{given.output}\n{picture}")
     return 0
+
+
+def _picture(pipeline: "Pipeline", title: str) -> "Figure":
+    """The geometry once, since nothing has moved yet, with its control points."""
+    from ..mesh import Surface
+    from ..plot import draw_net, of_deformation, of_geometry
+    from ..plot.pictures import nets
+
+    if not isinstance(pipeline.geometry, Surface):
+        return of_deformation(pipeline, title=title)
+    figure = of_geometry(pipeline.geometry, title=title)
+    for net in nets(pipeline):
+        draw_net(figure.axes[0], net.lines, net.rest)
+    return figure
 
 
 def _shape(text: str | None) -> tuple[int, ...] | None:

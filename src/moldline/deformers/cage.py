@@ -132,14 +132,17 @@ class Cage(AbstractControlNet):
         *,
         component: str | None = None,
         denser: Sequence[Denser] = (),
+        symmetric: bool = False,
         **options: Any,
     ) -> "Cage":
         """An even cage of about `faces` triangles around a surface, or one component of it.
 
         `offset` is its distance as a part of the diagonal of what it encloses; each of `denser`,
-        a place, a radius [m] and a factor, makes edges there as many times shorter.
+        a place, a radius [m] and a factor, makes edges there as many times shorter. A `symmetric`
+        one goes around a half model and its mirror image about y = 0, and is symmetric itself, so
+        that `links.mirrored` keeps points on that plane.
         """
-        made = enclosure(surface, faces, offset, component, denser)
+        made = enclosure(surface, faces, offset, component, denser, symmetric)
         return cls.of(made.surface, **options)
 
     @classmethod
@@ -151,14 +154,16 @@ class Cage(AbstractControlNet):
         offset: float = 0.1,
         *,
         component: str | None = None,
+        symmetric: bool = False,
         **options: Any,
     ) -> "Cage":
         """Rings around the sections of a half wing, numbered station by station.
 
         Ring s has the points from 2 s chordwise on: the upper ones along the chord, then the lower
-        ones back. `offset` is its distance in chords and in section heights.
+        ones back. `offset` is its distance in chords and in section heights. `symmetric` is as in
+        `around`; stations then run from the tip of the mirror image to that of the wing.
         """
-        made = wing_rings(surface, stations, chordwise, offset, component)
+        made = wing_rings(surface, stations, chordwise, offset, component, symmetric)
         return cls.of(made.surface, **options)
 
     @classmethod
@@ -170,13 +175,15 @@ class Cage(AbstractControlNet):
         offset: float = 0.1,
         *,
         component: str | None = None,
+        symmetric: bool = False,
         **options: Any,
     ) -> "Cage":
         """Rings of `around` points around the sections of a body along x, from the nose on.
 
         Ring s has the points from s around on, the first above, then towards positive y.
+        `symmetric` is as in `around`.
         """
-        made = body_rings(surface, stations, around, offset, component)
+        made = body_rings(surface, stations, around, offset, component, symmetric)
         return cls.of(made.surface, **options)
 
     @classmethod
@@ -248,13 +255,13 @@ class Cage(AbstractControlNet):
     @override
     def __call__(self, points: Points, controls: Vector) -> Points:
         points, moves = jnp.asarray(points), self.moves(jnp.asarray(controls))
-        if self.coordinates == "mean value":
+        if not isinstance(self.solved, Harmonic):
             return points + self.solved.evaluated(points) @ moves
         still = jax.lax.stop_gradient(points)
         inside = _inside(still, self.rest, self.shape.faces)[:, None]
         somewhere = jnp.asarray(self.samples(1)[0])  # a slope there is not asked for
-        weights = self.solved.evaluated(jnp.where(inside, points, somewhere))
-        return points + jnp.where(inside, weights @ moves, 0.0)
+        shift = self.solved.evaluated(jnp.where(inside, points, somewhere), moves)
+        return points + jnp.where(inside, shift, 0.0)
 
     @override
     def bind(self, points: Points) -> AbstractBinding:

@@ -15,6 +15,7 @@ from ..numerics.nearest import nearest
 from ..numerics.winding import winding
 from .intersections import self_intersections
 from .surface import Surface
+from .symmetric import FLIP, evened, joined, with_image
 from .topology import edges, is_closed, nonmanifold_vertices
 
 CELLS = 2
@@ -67,12 +68,15 @@ def enclosure(
     offset: float = 0.05,
     component: str | None = None,
     denser: Sequence[Denser] = (),
+    symmetric: bool = False,
 ) -> Enclosure:
     """A closed, even triangulation of about `faces` triangles around a surface or a part of it.
 
     `offset` is about its distance, as a part of the diagonal of what it encloses. Each of `denser`,
     a place, a radius [m] and a factor, makes edges within that radius about as many times shorter.
-    There are more faces than asked for where fewer cannot enclose it at that distance.
+    There are more faces than asked for where fewer cannot enclose it at that distance. Where it is
+    `symmetric` a half model and its mirror image about y = 0 are enclosed, by a surface that is
+    symmetric to the bit.
 
     Raises
     ------
@@ -84,6 +88,8 @@ def enclosure(
             f"a cage has 20 faces or more and an offset of 0 to 1, got {faces} and {offset}"
         )
     points, triangles = part_of(geometry, component)
+    if symmetric:
+        points, triangles = with_image(points, triangles)
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
     if not np.isfinite(diagonal) or diagonal == 0:
         raise GeometryError("a cage needs a geometry of finite size, got one without extent")
@@ -91,9 +97,9 @@ def enclosure(
     fine = _at_distance(points, triangles, reach)
     count = faces
     while count < len(fine.faces) / 4:
-        cage = _coarse(fine, count // 2 + 2, denser)
-        if cage is not None:
-            cage = _pushed(cage, points, triangles, reach)
+        cage = _half(fine, count, denser) if symmetric else _coarse(fine, count // 2 + 2, denser)
+        if cage is not None and _is_whole(cage):
+            cage = _pushed(cage, points, triangles, reach, symmetric)
             clearance = clear_of(cage, points, triangles)
             if clearance > 0:
                 return Enclosure(cage, clearance)
@@ -142,6 +148,28 @@ def _at_distance(points: np.ndarray, triangles: np.ndarray, reach: float) -> Sur
     return Surface(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts, np.int64))
 
 
+def _half(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | None:
+    """About `count` triangles, half of them on each side of y = 0."""
+    points, faces = np.asarray(fine.points), np.asarray(fine.faces)
+    faces = faces[np.all(points[faces, 1] >= 0, axis=1)]
+    used, faces = np.unique(faces, return_inverse=True)
+    points, faces = points[used], faces.reshape(-1, 3)
+    a, b, c = (points[faces[:, i]] for i in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    found = edges(faces)
+    border = points[found.ends[found.uses == 1]]
+    length = np.linalg.norm(border[:, 0] - border[:, 1], axis=1).sum()
+    on_plane = length / np.sqrt(4 / np.sqrt(3) * area / (count / 2))  # edges of even triangles
+    cage = _coarse(Surface(points, faces), int(count / 2 + on_plane + 2) // 2, denser)
+    return None if cage is None else joined(np.asarray(cage.points), np.asarray(cage.faces))
+
+
+def _is_whole(cage: Surface) -> bool:
+    faces = np.asarray(cage.faces)
+    every_point = len(np.unique(faces)) == len(cage.points)
+    return every_point and is_closed(faces) and not len(nonmanifold_vertices(faces))
+
+
 def _coarse(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | None:
     """As many of a surface's points, evenly spread, joined where their regions meet.
 
@@ -168,10 +196,8 @@ def _coarse(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | No
         order = np.lexsort((gaps, owner))
         seeds = order[np.searchsorted(owner[order], np.arange(count))].tolist()
     corners = _owners(graph, seeds)[faces]
-    joined = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
-    cage = Surface(points[seeds], joined)
-    is_whole = np.all(edges(joined).uses == 2) and len(np.unique(joined)) == count
-    return cage if is_whole and not len(nonmanifold_vertices(joined)) else None
+    met = corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)]
+    return Surface(points[seeds], met) if len(met) else None
 
 
 def _owners(graph: scipy.sparse.csr_array, seeds: list[int]) -> np.ndarray:
@@ -184,10 +210,13 @@ def _owners(graph: scipy.sparse.csr_array, seeds: list[int]) -> np.ndarray:
     return number[sources]
 
 
-def _pushed(cage: Surface, points: np.ndarray, triangles: np.ndarray, reach: float) -> Surface:
+def _pushed(
+    cage: Surface, points: np.ndarray, triangles: np.ndarray, reach: float, symmetric: bool
+) -> Surface:
     """The cage with its points moved outwards until it is far enough from all triangles."""
     places = _sampled(points, triangles, reach)
     around, faces = np.array(cage.points), np.asarray(cage.faces)
+    image = evened(around)[1] if symmetric else np.arange(len(around))
     for _ in range(PUSHES):
         found = nearest(places, around, faces)
         inside = winding(places, around, faces) > 0.5
@@ -199,7 +228,9 @@ def _pushed(cage: Surface, points: np.ndarray, triangles: np.ndarray, reach: flo
         push = np.zeros(len(around))
         for corner in faces.T:
             np.maximum.at(push, corner, short)
-        around += 1.1 * push[:, None] * _normals(around, faces)
+        around += 1.1 * np.maximum(push, push[image])[:, None] * _normals(around, faces)
+        if symmetric:
+            around = (around + FLIP * around[image]) / 2
     return Surface(around, faces)
 
 

@@ -11,6 +11,7 @@ from .enclosure import clear_of, part_of
 from .planform import planform
 from .slices import NEAR, section
 from .surface import Surface
+from .symmetric import FLIP, evened, with_image
 
 TRIES = 12
 NEAREST = 0.3
@@ -44,13 +45,15 @@ def wing_rings(
     chordwise: int = 4,
     offset: float = 0.1,
     component: str | None = None,
+    symmetric: bool = False,
 ) -> Rings:
     """A cage around a half wing: at each station a ring that fits its chord and height.
 
     A ring runs from its upper leading corner along the chord and back below: the first `chordwise`
     points are above, the others below from the trailing edge to the leading one. `offset` is its
     distance from the section, as a part of the chord along it and of the largest height above and
-    below. Rings beyond root and tip close it.
+    below. Rings beyond root and tip close it. Where it is `symmetric`, the root's ring lies at
+    y = 0, and rings from the mirror image's tip to there come first.
     """
     if chordwise < 2:
         raise ParameterError(f"a ring has two points or more along the chord, got {chordwise}")
@@ -65,13 +68,15 @@ def wing_rings(
         )
     outward = np.sign(y[-1] - y[0])
     root, tip = (low, high) if outward > 0 else (high, low)
+    if symmetric:
+        points, triangles = with_image(points, triangles)
     height = np.maximum(found.high - found.low, 0.02 * chord)
 
     def rings(grown: float) -> np.ndarray:
         ends = np.array(
             [root - outward * grown * offset * chord[0], tip + outward * grown * offset * chord[-1]]
         )
-        at = np.concatenate([ends[:1], y[1:-1], ends[1:]])
+        at = np.concatenate([[0.0] if symmetric else ends[:1], y[1:-1], ends[1:]])
         nose = np.stack([_along(y, found.leading[:, d], at) for d in (0, 2)], axis=1)
         aft = np.stack([_along(y, found.trailing[:, d], at) for d in (0, 2)], axis=1)
         length, tall = _along(y, chord, at), _along(y, height, at)
@@ -87,10 +92,12 @@ def wing_rings(
             [x, np.broadcast_to(at[:, None], x.shape), np.broadcast_to(up[:, None], x.shape)], -1
         )
         bottoms = np.stack([x, tops[..., 1], np.broadcast_to(down[:, None], x.shape)], -1)
-        return np.concatenate([tops, bottoms[:, ::-1]], axis=1)
+        own = np.concatenate([tops, bottoms[:, ::-1]], axis=1)
+        return np.concatenate([own[:0:-1] * FLIP, own]) if symmetric else own
 
     least = NEAREST * offset * float(height.min())
-    return _enclosing(rings, points, triangles, least, f"{len(y)} stations")
+    what = f"{len(y)} stations"
+    return _enclosing(rings, points, triangles, least, what, symmetric)
 
 
 def body_rings(
@@ -99,15 +106,20 @@ def body_rings(
     around: int = 8,
     offset: float = 0.1,
     component: str | None = None,
+    symmetric: bool = False,
 ) -> Rings:
     """A cage around a body along x: at each station a ring around its section.
 
     A ring begins above and runs towards positive y. `offset` is its distance, as a part of the
-    largest half width. Rings beyond nose and tail close it.
+    largest half width. Rings beyond nose and tail close it. Where it is `symmetric`, it goes around
+    a half body and its mirror image about y = 0.
     """
-    if around < 4:
-        raise ParameterError(f"a ring has four points or more, got {around}")
+    if around < 4 or (symmetric and around % 2):
+        even = ", an even number where it is symmetric" if symmetric else ""
+        raise ParameterError(f"a ring has four points or more{even}, got {around}")
     points, triangles = part_of(surface, component)
+    if symmetric:
+        points, triangles = with_image(points, triangles)
     low, high = points[:, 0].min(), points[:, 0].max()
     if isinstance(stations, int):
         if stations < 2:
@@ -130,7 +142,8 @@ def body_rings(
         return np.concatenate([np.broadcast_to(at[:, None, None], (*ring.shape[:2], 1)), ring], -1)
 
     least = NEAREST * offset * widest
-    return _enclosing(rings, points, triangles, least, f"{len(inner)} stations")
+    what = f"{len(inner)} stations"
+    return _enclosing(rings, points, triangles, least, what, symmetric)
 
 
 def _enclosing(
@@ -139,11 +152,12 @@ def _enclosing(
     triangles: np.ndarray,
     least: float,
     what: str,
+    symmetric: bool,
 ) -> Rings:
     """Rings far enough out to enclose, closed at both ends."""
     grown = 1.0
     for _ in range(TRIES):
-        cage, numbers = _skinned(rings(grown))
+        cage, numbers = _skinned(rings(grown), symmetric)
         clearance = clear_of(cage, points, triangles)
         if clearance > least:
             return Rings(cage, numbers, clearance)
@@ -151,7 +165,7 @@ def _enclosing(
     raise GeometryError(f"no rings at {what} enclose this geometry; ask for more stations")
 
 
-def _skinned(rings: Float[np.ndarray, "s k 3"]) -> tuple[Surface, np.ndarray]:
+def _skinned(rings: Float[np.ndarray, "s k 3"], symmetric: bool) -> tuple[Surface, np.ndarray]:
     count, around = rings.shape[:2]
     numbers = np.arange(count * around).reshape(count, around)
     a, d = numbers[:-1].ravel(), np.roll(numbers, -1, axis=1)[:-1].ravel()
@@ -167,6 +181,10 @@ def _skinned(rings: Float[np.ndarray, "s k 3"]) -> tuple[Surface, np.ndarray]:
         ]
     )
     points = np.concatenate([rings.reshape(-1, 3), rings[[0, -1]].mean(axis=1)])
+    if symmetric:  # quadrilaterals are cut alike on both sides
+        points, image = evened(points)
+        faces = faces[np.all(points[faces, 1] >= 0, axis=1)]
+        faces = np.concatenate([faces, image[faces][:, ::-1]])
     corners = points[faces]
     if np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) < 0:
         faces = faces[:, ::-1]

@@ -121,12 +121,17 @@ class Harmonic:
         )  # fmt: skip
         return out, kind
 
-    def evaluated(self, points: Float[Array, "n 3"]) -> Float[Array, "n m"]:
-        """The same in JAX, differentiable by the points; first derivatives are exact."""
+    def evaluated(
+        self, points: Float[Array, "n 3"], of: Float[Array, "m c"] | None = None
+    ) -> Float[Array, "n c"]:
+        """The same in JAX, differentiable by the points; first derivatives are exact.
+
+        With `of`, what belongs to each of the cage's points, its sums by the weights.
+        """
         if self._jax_tables is None:
             with jax.ensure_compile_time_eval():
                 self._jax_tables = Tables(*map(jax.numpy.asarray, self._tables))
-        return looked_up(self._jax_tables, jax.numpy.asarray(points))
+        return looked_up(self._jax_tables, jax.numpy.asarray(points), of)
 
 
 def _counted(cells: float | Sequence[float]) -> tuple[int, int, int]:

@@ -44,6 +44,7 @@ bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, file
 	@$(BIN)/python benchmarks/deform.py
 	@$(BIN)/python benchmarks/embedding.py
 	@$(BIN)/python benchmarks/cage.py
+	@$(BIN)/python benchmarks/cage_errors.py
 	@$(BIN)/python benchmarks/files.py
 
 docs: .venv/ready-dev  ## the documentation, into site/

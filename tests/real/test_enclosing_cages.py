@@ -7,6 +7,7 @@ import moldline as ml
 from moldline.cli import main
 from moldline.mesh.enclosure import clear_of
 from moldline.mesh.stitch import stitched
+from moldline.mesh.symmetric import is_half
 
 SURFACES = ["pygeo/bwb.stl", "pygeo/c172.stl", "su2/onera_m6_surface.stl"]
 PATCHES = "crm_wing_body_patches.xyz.gz"
@@ -64,6 +65,18 @@ def test_rings_enclose_a_real_half_wing(data, name, stations, chordwise):
         surface = surface.moved(np.asarray(surface.points) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
     cage = ml.Cage.around_wing(surface, stations, chordwise)
     assert clearance(cage, surface) > 0
+
+
+@pytest.mark.parametrize("name", ["pygeo/c172.stl", "su2/onera_m6_surface.stl", PATCHES])
+@pytest.mark.parametrize("maker", ["around", "around_wing", "around_body"])
+def test_a_symmetric_cage_encloses_a_real_half_model(data, name, maker):
+    surface = of(data, name)
+    if name.startswith("pygeo"):  # span along z
+        surface = surface.moved(np.asarray(surface.points) @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    assert is_half(np.asarray(surface.points))
+    cage = getattr(ml.Cage, maker)(surface, symmetric=True)
+    assert clearance(cage, surface) > 0
+    assert {*map(tuple, (cage.rest * [1, -1, 1]).tolist())} == {*map(tuple, cage.rest.tolist())}
 
 
 def test_rings_around_a_whole_wing_are_refused(data):

@@ -88,13 +88,12 @@ def enclosure(
             f"a cage has 20 faces or more and an offset of 0 to 1, got {faces} and {offset}"
         )
     points, triangles = part_of(geometry, component)
-    if symmetric:
-        points, triangles = with_image(points, triangles)
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    whole = with_image(points, triangles) if symmetric else (points, triangles)
+    diagonal = float(np.linalg.norm(np.ptp(whole[0], axis=0)))
     if not np.isfinite(diagonal) or diagonal == 0:
         raise GeometryError("a cage needs a geometry of finite size, got one without extent")
     reach = offset * diagonal
-    fine = _at_distance(points, triangles, reach)
+    fine = _at_distance(*whole, reach)
     count = faces
     while count < len(fine.faces) / 4:
         cage = _half(fine, count, denser) if symmetric else _coarse(fine, count // 2 + 2, denser)

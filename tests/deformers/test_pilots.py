@@ -222,6 +222,15 @@ def test_a_bound_that_does_not_hold_at_rest_is_met_by_the_nearest_shape(body, la
     assert points[2, 2] - points[5, 2] == pytest.approx(1.6, abs=1e-12)
 
 
+def test_a_value_that_is_not_the_one_at_rest_is_prescribed_by_equal_bounds(body, lattice):
+    raised = {"top": Constraint(Position(V(2), "z"), 0.9, 0.9)}
+    pilots = Pilots(body, {"nose": Position(V(3), "z")}, raised, lattice)
+    points = np.asarray(pilots.bind(body.points)(np.array([0.1])))
+    assert points[[2, 3], 2] == pytest.approx([0.9, body.points[3, 2] + 0.1], abs=1e-13)
+    assert pilots.report(np.array([0.1])).status == "met"
+    prove(pilots.bind(body.points), np.array([0.1]), np.array([0.05]))
+
+
 def test_bounds_that_contradict_are_told(body, lattice):
     both = {
         "up": Constraint(Position(V(2), "z"), lower=0.9),

@@ -109,7 +109,8 @@ class Pilots(AbstractPosed):
     response
         Hidden controls for each number of the pilots, where all is linear.
     is_linear
-        Whether the conditions are equations that change in proportion to the hidden controls.
+        Whether the conditions are equations that hold at rest and change in proportion to the
+        hidden controls.
     step
         The part of its miss that each of the solver's steps makes good, K in the source.
 
@@ -167,7 +168,10 @@ class Pilots(AbstractPosed):
         self.measured, slopes = self.readings.at_rest()
         counts = [measure.size for measure in self.measures]
         self.conditions = conditions(named, counts, self.measured, slopes, costs, extent)
-        self.is_linear = all(self.readings.is_affine) and not len(self.conditions.bounds)
+        wanted = self.conditions.wanted
+        is_kept = np.array_equal(wanted, self.measured[self.conditions.equations])
+        are_equations = is_kept and not len(self.conditions.bounds)
+        self.is_linear = all(self.readings.is_affine) and are_equations
         self.response = self.conditions.response(slopes)[:, : self.size] if self.is_linear else None
         self.solver = jax.jit(lambda x: self._solved(self.readings, self.readings, x))
 

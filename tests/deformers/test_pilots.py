@@ -231,6 +231,15 @@ def test_a_value_that_is_not_the_one_at_rest_is_prescribed_by_equal_bounds(body,
     prove(pilots.bind(body.points), np.array([0.1]), np.array([0.05]))
 
 
+@pytest.mark.parametrize("which", ["moved", "bent"])
+def test_what_is_no_number_is_not_met(which, request):
+    pilots = request.getfixturevalue(which)
+    change = np.full(pilots.size, np.nan)
+    report = pilots.report(change)
+    assert report.status == "not converged" and set(pilots.pilots) <= set(report.unmet)
+    assert np.isnan(np.asarray(pilots.pose(change))).all()
+
+
 def test_bounds_that_contradict_are_told(body, lattice):
     both = {
         "up": Constraint(Position(V(2), "z"), lower=0.9),

@@ -258,7 +258,7 @@ class Pilots(AbstractPosed):
         names = [*self.pilots, *self.constraints]
         ends = np.cumsum([measure.size for measure in self.measures])[:-1]
         misses = dict(zip(names, np.split(scaled * asked.scales, ends), strict=True))
-        far = zip(names, np.split(np.abs(scaled) > UNMET * asked.size, ends), strict=True)
+        far = zip(names, np.split(~(np.abs(scaled) <= UNMET * asked.size), ends), strict=True)
         unmet = tuple(name for name, is_far in far if np.any(is_far))
         return PilotReport(
             self._status(solution, bool(unmet), curvature),
@@ -283,7 +283,7 @@ class Pilots(AbstractPosed):
         return float(largest / motion) if motion > 0 else 0.0
 
     def _status(self, solution: Solution, misses_some: bool, curvature: float) -> str:
-        if not float(solution.size) <= SETTLED:
+        if not float(solution.size) <= SETTLED or not np.all(np.isfinite(solution.x)):
             return "not converged"
         if misses_some:
             return "least squares"

@@ -17,8 +17,10 @@ def smallest_curvature(problem: Problem, motion: Vector, solution: Solution) -> 
 
     The smallest eigenvalue of the Lagrangian's second derivative in the weighted controls, on the
     motions that the active conditions leave free: above 0 the motion is a minimum, and depends
-    smoothly on what is asked.
+    smoothly on what is asked. Of a motion that is no number it is none either.
     """
+    if not np.all(np.isfinite(motion)):
+        return np.nan
     root = np.sqrt(np.asarray(problem.weights))
     active = np.asarray(solution.active)
     slopes = np.asarray(problem.evaluated(motion)[1])[active] / root

@@ -143,7 +143,7 @@ def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solu
 
     start = jnp.zeros(weights.shape)
     missed = jnp.max(_violation(problem, problem.missing(start)))
-    begun = jnp.where(missed > problem.rounding, jnp.inf, 0.0)
+    begun = jnp.where(missed <= problem.rounding, 0.0, jnp.inf)  # also where it is no number
     none = jnp.zeros(len(is_bound))
     state = Solution(start, none, jnp.asarray(~is_bound), jnp.zeros((), int), begun)
     return jax.lax.while_loop(unfinished, step, state)

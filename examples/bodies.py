@@ -1,4 +1,4 @@
-"""Surfaces that the examples deform: a re-entry capsule, a fuselage, a supersonic wing."""
+"""What the examples deform: a re-entry capsule, a fuselage, a supersonic wing, an airfoil."""
 
 from typing import Any
 
@@ -90,6 +90,19 @@ def supersonic_wing(chordwise: int = 61, spanwise: int = 81) -> ml.Surface:
     rings[..., 2] = chord[:, None] * loop[:, 1]
     middle = np.stack([leading + chord / 2, y, np.zeros(spanwise)], axis=1)
     return skinned(rings, middle[[0, -1]])
+
+
+def naca_0012(side: int = 100) -> ml.Section:
+    """The airfoil of chord 1 with a sharp trailing edge, by its formula; `side` segments a side.
+
+    The last coefficient is 0.1036 instead of 0.1015, which closes the trailing edge.
+    """
+    x = 0.5 * (1 - np.cos(np.pi * np.arange(side + 1) / side))
+    slopes = -0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4
+    y = 0.6 * (0.2969 * np.sqrt(x) + slopes)
+    y[-1] = 0.0
+    upper = np.stack([x, y, np.zeros(side + 1)], axis=1)
+    return ml.Section(np.concatenate([upper[::-1], upper[1:] * [1, -1, 1]]), "NACA 0012")
 
 
 def skinned(rings: Any, ends: Any) -> ml.Surface:

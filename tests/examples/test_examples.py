@@ -48,7 +48,7 @@ def _examples():
         yield pytest.param(path, id=path.stem, marks=marks)
 
 
-@pytest.mark.parametrize("path", _examples())
+@pytest.mark.parametrize("path", list(_examples()))
 def test_an_example_gives_its_numbers(path):
     numbers = runpy.run_path(str(path))["main"]()
     order = numbers.pop("order", 2.0)

@@ -61,6 +61,8 @@ def test_what_is_beyond_its_bounds_is_told_by_how_much(measured):
     assert measured.beyond(measured()) == {}
     assert measured.beyond({**measured(), "span": np.array([2.3])})["span"] == pytest.approx([0.2])
     assert measured.beyond({**measured(), "span": np.array([1.7])})["span"] == pytest.approx([0.2])
+    unknown = {name: np.full_like(own, np.nan) for name, own in measured().items()}
+    assert list(measured.beyond(unknown)) == ["span"]
 
 
 def test_an_optimiser_keeps_to_the_bounds(measured):

@@ -60,7 +60,8 @@ class Measurements:
             miss = np.maximum(np.maximum(low - own, own - high), 0.0)
             bound = np.where(own < low, low, high)
             size = np.maximum(1.0, np.where(miss > 0, np.abs(bound), 1.0))
-            if np.any(miss > BEYOND * size):
+            is_bounded = np.isfinite(low) | np.isfinite(high)
+            if np.any(is_bounded & ~(miss <= BEYOND * size)):
                 found[name] = miss
         return found
 

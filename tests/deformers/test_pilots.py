@@ -222,6 +222,17 @@ def test_a_bound_that_does_not_hold_at_rest_is_met_by_the_nearest_shape(body, la
     assert points[2, 2] - points[5, 2] == pytest.approx(1.6, abs=1e-12)
 
 
+def test_a_bound_that_a_pilot_contradicts_does_not_hold_up_the_others(body, lattice):
+    bounds = {
+        "roof": Constraint(Position(V(2), "z"), upper=0.8),
+        "keel": Constraint(Position(V(5), "z"), lower=-0.69),
+    }
+    moved = {"top": Position(V(2), "z"), "nose": Position(V(3), "z")}
+    report = Pilots(body, moved, bounds, lattice).report(np.array([0.3, -0.1]))
+    assert (report.status, report.unmet, report.active) == ("least squares", ("roof",), ("keel",))
+    assert report.misses["roof"] == pytest.approx([0.2])
+
+
 def test_a_value_that_is_not_the_one_at_rest_is_prescribed_by_equal_bounds(body, lattice):
     raised = {"top": Constraint(Position(V(2), "z"), 0.9, 0.9)}
     pilots = Pilots(body, {"nose": Position(V(3), "z")}, raised, lattice)

@@ -58,6 +58,17 @@ def test_an_example_gives_its_numbers(path):
     assert order == pytest.approx(2.0, abs=0.05)  # the estimate of an order is rough
 
 
+def test_a_wing_by_twenty_pilots_keeps_what_it_must():
+    """The part of the long example that takes little time: no tank."""
+    script = runpy.run_path(str(EXAMPLES / "ex06_wing_pilots.py"))
+    wing = ml.read(EXAMPLES / "data/transport_wing.tri")
+    pilots = script["parameterised"](wing)
+    case = ml.Pipeline(wing, [ml.Stage(pilots, {script["moves"](): ml.links.controls(pilots)})])
+    assert pilots.size == 20
+    for changes in (np.ravel(script["DESIGN"]), np.linspace(-0.1, 0.1, 20)):
+        assert script["worst"](case, pilots, changes) < 1e-10
+
+
 def test_the_shipped_wing_is_what_its_script_makes(tmp_path):
     script = runpy.run_path(str(EXAMPLES / "make_transport_wing.py"))
     numbers = script["main"](["-o", str(tmp_path / "wing.tri")])

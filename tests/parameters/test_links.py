@@ -192,6 +192,8 @@ def test_a_named_parameter_is_turned_by_changes_or_by_what_it_measures():
     np.testing.assert_array_equal(measured(np.array([2.5, 3.25])), [0.5, 0.25, 0.0])
     one = links.named(posed, "spread", index=[1], absolute=True)
     np.testing.assert_array_equal(one(np.array([3.25])), [0.0, 0.25, 0.0])
+    several = links.named(posed, ["lift", "spread"], index=[2, 0])
+    np.testing.assert_array_equal(several(np.array([3.0, 5.0])), [0.0, 3.0, 5.0])
     lift = links.named(posed, "lift", absolute=True)
     both = (lift + one) * 2.0
     np.testing.assert_array_equal(both(np.array([4.0])), [0.0, 2.0, -2.0])

@@ -24,7 +24,7 @@ from .hidden import automatic
 from .net import AbstractControlNet
 from .posed import AbstractPosed
 from .readings import FEW, Readings
-from .second_order import smallest_curvature
+from .second_order import Probe, probe, smallest_curvature
 
 TOLERANCE = 1e-12
 """Of the last step, relative to the motion."""
@@ -132,6 +132,7 @@ class Pilots(AbstractPosed):
     conditions: Conditions = eqx.field(static=True)
     readings: Readings = eqx.field(static=True)
     solver: Callable[[Vector], Solution] = eqx.field(static=True)
+    probed: Probe = eqx.field(static=True)
 
     def __init__(
         self,
@@ -173,6 +174,7 @@ class Pilots(AbstractPosed):
         are_equations = is_kept and not len(self.conditions.bounds)
         self.is_linear = all(self.readings.is_affine) and are_equations
         self.response = self.conditions.response(slopes)[:, : self.size] if self.is_linear else None
+        self.probed = probe(lambda change: self.conditions.problem(self.readings, change))
         self.solver = jax.jit(lambda x: self._solved(self.readings, self.readings, x))
 
     @classmethod
@@ -242,19 +244,21 @@ class Pilots(AbstractPosed):
 
     def report(self, controls: Vector, points: Points | None = None) -> PilotReport:
         """How well the conditions are met, on the shape at rest or after earlier stages."""
-        asked, readings, change = self.conditions, self.readings, jnp.asarray(controls)
+        asked, change = self.conditions, jnp.asarray(controls)
         if points is None:
-            solution = self._solution(change)
+            readings, probed, solution = self.readings, self.probed, self._solution(change)
         else:
             readings = Readings(self.net, self.measures, lambda r: self.net.bind(points[r]))
+            probed = probe(lambda change: asked.problem(readings, change))
             solution = self._solved(readings, readings, change)
         motion = solution.x - jnp.asarray(self.net.neutral)
         scaled = np.zeros(len(asked.labels))
         scaled[asked.equations], over = asked.slack(readings.values(motion), change)
         np.maximum.at(scaled, asked.bounds, np.asarray(over))
         is_active = np.asarray(solution.active)[asked.is_bound]
-        problem = asked.problem(readings, change)
-        curvature = 1.0 if self.is_linear else smallest_curvature(problem, motion, solution)
+        curvature = 1.0
+        if not self.is_linear:
+            curvature = smallest_curvature(probed, asked.weights, change, motion, solution)
         names = [*self.pilots, *self.constraints]
         ends = np.cumsum([measure.size for measure in self.measures])[:-1]
         misses = dict(zip(names, np.split(scaled * asked.scales, ends), strict=True))

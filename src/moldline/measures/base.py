@@ -41,7 +41,7 @@ class AbstractMeasure(eqx.Module):
         """The same, for a measure that reads the controls of the deformer too; few do."""
         return self.of(places)
 
-    def marks(self, places: Points) -> Points:
+    def marks(self, places: Points) -> Array:
         """Where pictures mark it, from the places of the points that it reads: these."""
         return places
 

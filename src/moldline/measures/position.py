@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from typing_extensions import override
 
-from .._types import Points, Vector
+from .._types import Array, Points, Vector
 from ..mesh import Geometry
 from .base import AbstractMeasure
 from .directions import Along, Way, directions
@@ -50,7 +50,7 @@ class Position(AbstractMeasure):
         return True
 
     @override
-    def marks(self, places: Points) -> Points:
+    def marks(self, places: Points) -> Array:
         return self.matrix @ places
 
     @override

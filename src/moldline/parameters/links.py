@@ -33,21 +33,27 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
 
 def named(
     deformer: AbstractNamed,
-    parameter: str,
+    parameter: str | list[str],
     index: Sequence[int] | None = None,
     absolute: bool = False,
 ) -> Link:
     """One variable number for each number of a parameter, or for those given by index.
 
+    Several parameters follow each other; their indices count through.
+
     The numbers are changes; with `absolute` they are what the parameter measures itself, such as a
     sweep of 35 degrees.
     """
     known = deformer.parameters
-    if parameter not in known:
-        raise ParameterError(f"no parameter {parameter!r}; there is: {', '.join(known)}")
-    chosen = range(len(known[parameter])) if index is None else index
-    _check_numbers(chosen, len(known[parameter]), f"the numbers of {parameter!r}")
-    link = controls(deformer, [int(known[parameter][i]) for i in chosen])
+    names = [parameter] if isinstance(parameter, str) else parameter
+    lost = [name for name in names if name not in known]
+    if lost or not names:
+        what = repr(lost[0]) if lost else "named"
+        raise ParameterError(f"no parameter {what}; there is: {', '.join(known)}")
+    rows = np.concatenate([known[name] for name in names])
+    chosen = range(len(rows)) if index is None else index
+    _check_numbers(chosen, len(rows), f"the numbers of {', '.join(map(repr, names))}")
+    link = controls(deformer, [int(rows[i]) for i in chosen])
     if not absolute:
         return link
     return Link(link.matrix, rest=link.matrix @ (link.matrix.T @ np.asarray(deformer.values)))

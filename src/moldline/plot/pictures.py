@@ -146,9 +146,13 @@ def _highlighted(
     return [
         np.array([], int)
         if before.is_hidden
-        else np.flatnonzero(np.any(before.moved != after.moved, axis=1))
+        else _moving(np.linalg.norm(after.moved - before.moved, axis=1))
         for before, after in pairs
     ]
+
+
+def _moving(motion: np.ndarray) -> np.ndarray:
+    return np.flatnonzero(motion > 1e-6 * motion.max(initial=0.0))  # not by rounding alone
 
 
 def _among_points(geometry: Geometry, drawn: list[Net], view: View | str, title: str) -> Figure:

@@ -130,6 +130,33 @@ def test_derivatives_by_points_are_exact(solved):
     prove(jax.jit(lambda p: harmonic.evaluated(p) @ moves), x, along)
 
 
+@pytest.mark.parametrize("name", ["elbow", "turned", "wing"])
+def test_compiled_slopes_are_those_of_the_definition(solved, name):
+    """From nodes alone, from the cage too, and in slivers, where only the cage encloses a point."""
+    points, faces = CAGES[name]
+    x = inside(points, faces, 1000, seed=3)
+    if name == "wing":
+        x = np.concatenate([x, _below(points, faces)])
+    of = np.random.default_rng(0).normal(size=points.shape)
+    slopes, kind = solved[name].slopes(x, of)
+    assert {0, 1} <= set(kind.tolist()) and (name != "wing" or np.sum(kind == 2) > 20)
+    for axis, along in enumerate(np.eye(3)):
+        given = (jnp.asarray(x),), (jnp.broadcast_to(along, x.shape),)
+        known = jax.jvp(lambda p: solved[name].evaluated(p, jnp.asarray(of)), *given)[1]
+        np.testing.assert_allclose(
+            slopes[..., axis], known, rtol=0, atol=1e-9 * np.abs(known).max()
+        )
+
+
+def _below(points, faces):
+    """A millionth below the faces."""
+    a, b, c = (points[faces[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    shares = np.random.default_rng(0).dirichlet([1, 1, 1], (40, len(faces)))
+    return (np.einsum("stk,tkd->std", shares, points[faces]) - 1e-6 * normal).reshape(-1, 3)
+
+
 def _deep(points, faces, x):
     """Those that are not within a hundredth of the cage's thickness of a face's plane."""
     a, b, c = (points[faces[:, k]] for k in range(3))
@@ -142,11 +169,7 @@ def _deep(points, faces, x):
 def test_derivatives_in_slivers_are_exact(solved):
     """Where only the cage itself encloses a point."""
     points, faces = CAGES["wing"]
-    a, b, c = (points[faces[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    shares = np.random.default_rng(0).dirichlet([1, 1, 1], (40, len(faces)))
-    x = (np.einsum("stk,tkd->std", shares, points[faces]) - 1e-6 * normal).reshape(-1, 3)
+    x = _below(points, faces)
     slivers = x[solved["wing"].traced(x)[1] == 2]
     assert len(slivers) > 20
     plain = solved["wing"].evaluated(slivers)

@@ -23,6 +23,7 @@ from ..numerics.mean_value import MeanValue
 from ..numerics.winding import winding, winding_in_jax
 from .base import AbstractBinding, DefinedBinding
 from .cage_embedding import embedded
+from .cage_kernels import Following
 from .cage_shape import Shape, shaped
 from .embedding import EmbeddedBinding
 from .net import AXES, AbstractControlNet
@@ -243,6 +244,11 @@ class Cage(AbstractControlNet):
         cells = self.cells if self.cells is None or len(self.cells) > 1 else self.cells[0]
         return Harmonic(self.shape.points, self.shape.faces, cells, True, self.shift)
 
+    @cached_property
+    def following(self) -> Following:
+        """The kernel of a harmonic cage for points that move."""
+        return Following(self)
+
     @override
     def samples(self, most: int) -> Points:
         low, high = self.rest.min(axis=0), self.rest.max(axis=0)
@@ -254,7 +260,10 @@ class Cage(AbstractControlNet):
 
     @override
     def __call__(self, points: Points, controls: Vector) -> Points:
-        points, moves = jnp.asarray(points), self.moves(jnp.asarray(controls))
+        return self.followed(jnp.asarray(points), self.moves(jnp.asarray(controls)))
+
+    def followed(self, points: Points, moves: Float[Array, "m 3"]) -> Points:
+        """The definition by displacements of the vertices; those frozen have none."""
         if not isinstance(self.solved, Harmonic):
             return points + self.solved.evaluated(points) @ moves
         still = jax.lax.stop_gradient(points)
@@ -272,6 +281,8 @@ class Cage(AbstractControlNet):
 
     @override
     def follow(self, points: Points, controls: Vector) -> Points:
+        if isinstance(self.solved, Harmonic):
+            return self.following(points, self.moves(controls))[0]
         if not is_concrete(points, controls):
             return self(points, controls)
         embedding = embedded(self, np.asarray(points), refuse=False)

@@ -19,7 +19,7 @@ from jaxtyping import Float, Int
 from .._types import Array
 from ..errors import GeometryError, ParameterError
 from . import cage_grid, harmonic_loops, multigrid
-from .harmonic_plain import Tables, looked_up
+from .harmonic_plain import Tables, looked_up, sliver_slopes
 from .kernel import empty
 from .threads import spread
 
@@ -132,6 +132,21 @@ class Harmonic:
             with jax.ensure_compile_time_eval():
                 self._jax_tables = Tables(*map(jax.numpy.asarray, self._tables))
         return looked_up(self._jax_tables, jax.numpy.asarray(points), of)
+
+    def slopes(
+        self, points: Float[np.ndarray, "n 3"], of: Float[np.ndarray, "m c"]
+    ) -> tuple[Float[np.ndarray, "n c 3"], Int[np.ndarray, "n"]]:
+        """Derivatives by the points of the sums of `of` by the weights, and `traced`'s kinds."""
+        points = np.ascontiguousarray(points, float)
+        tables = self._tables._replace(values=self._tables.values @ of)
+        out, kind = np.empty((len(points), of.shape[1], 3)), np.empty(len(points), int)
+        spread(
+            harmonic_loops.slopes, len(points), points, *tables, out, kind, least=THREAD_WORTH
+        )  # fmt: skip
+        slivers = kind == 2
+        if slivers.any():
+            out[slivers] = sliver_slopes(self._tables, points[slivers], of)
+        return out, kind
 
 
 def _counted(cells: float | Sequence[float]) -> tuple[int, int, int]:

@@ -147,6 +147,34 @@ def _basis(t: float, out: np.ndarray) -> None:
 
 
 @_compiled
+def _around(
+    point: np.ndarray, origin: np.ndarray, spacing: np.ndarray, site: np.ndarray,
+    u: np.ndarray, first: np.ndarray, basis: np.ndarray, rows: np.ndarray, prior: np.ndarray,
+) -> int:  # fmt: skip
+    """A point's place in cells, the 27 sites around it, and their shares by the spline.
+
+    Returns the largest number of a site, -1 where one of them does not exist.
+    """
+    known = True
+    for d in range(3):
+        u[d] = (point[d] - origin[d]) / spacing[d]
+        known &= 1.0 <= u[d] <= site.shape[d] - 2.0
+        if known:
+            first[d] = int(np.floor(u[d] + 0.5)) - 1
+            _basis(u[d] - first[d] - 1, basis[d])
+    if not known:
+        return -1
+    most = -1
+    for k in range(27):
+        x, y, z = k // 9, k // 3 % 3, k % 3
+        prior[k] = basis[0, x] * basis[1, y] * basis[2, z]
+        rows[k] = site[first[0] + x, first[1] + y, first[2] + z]
+        most = max(most, rows[k])
+        known &= rows[k] >= 0
+    return most if known else -1
+
+
+@_compiled
 def look_up(
     points: np.ndarray, origin: np.ndarray, spacing: np.ndarray, site: np.ndarray,
     sites: np.ndarray, inside: int, values: np.ndarray, corners: np.ndarray, faces: np.ndarray,
@@ -162,23 +190,9 @@ def look_up(
     u, first = np.empty(3), np.empty(3, np.int64)
     columns = values.shape[1]
     for p in range(start, stop):
-        known = True
-        for d in range(3):
-            u[d] = (points[p, d] - origin[d]) / spacing[d]
-            known &= 1.0 <= u[d] <= site.shape[d] - 2.0
-            if known:
-                first[d] = int(np.floor(u[d] + 0.5)) - 1
-                _basis(u[d] - first[d] - 1, basis[d])
-        most = -1
-        if known:
-            for k in range(27):
-                x, y, z = k // 9, k // 3 % 3, k % 3
-                prior[k] = basis[0, x] * basis[1, y] * basis[2, z]
-                rows[k] = site[first[0] + x, first[1] + y, first[2] + z]
-                most = max(most, rows[k])
-                known &= rows[k] >= 0
+        most = _around(points[p], origin, spacing, site, u, first, basis, rows, prior)
         result = out[p]
-        if not known:
+        if most < 0:
             kind[p] = 2
             between(u, spacing, corners, faces, result)
             continue
@@ -199,3 +213,73 @@ def look_up(
             a, row = weight[k], values[rows[k]]
             for j in range(columns):
                 result[j] += a * row[j]
+
+
+@_compiled
+def _tilted_slopes(
+    slope: np.ndarray, prior: np.ndarray, share: np.ndarray, off: np.ndarray
+) -> None:
+    """Turn slopes of the prior shares (27, 3), by the place, into those of the tilted ones.
+
+    The pull changes with the place so that the shares' mean goes on being the point.
+    """
+    h, given, pull = np.zeros(6), np.empty(3), np.empty(3)
+    for k in range(27):
+        a, x, y, z = share[k], off[k, 0], off[k, 1], off[k, 2]
+        h[0] += a * x * x
+        h[1] += a * x * y
+        h[2] += a * x * z
+        h[3] += a * y * y
+        h[4] += a * y * z
+        h[5] += a * z * z
+    for d in range(3):
+        given[:] = 0.0
+        given[d] = 1.0
+        mean = 0.0
+        for k in range(27):
+            slope[k, d] *= share[k] / prior[k] if prior[k] > 0 else 0.0
+            mean += slope[k, d]
+            for i in range(3):
+                given[i] -= slope[k, d] * off[k, i]
+        _solved(h, given, pull)
+        for k in range(27):
+            along = pull[0] * off[k, 0] + pull[1] * off[k, 1] + pull[2] * off[k, 2]
+            slope[k, d] += share[k] * (along - mean)
+
+
+@_compiled
+def slopes(
+    points: np.ndarray, origin: np.ndarray, spacing: np.ndarray, site: np.ndarray,
+    sites: np.ndarray, inside: int, values: np.ndarray, corners: np.ndarray, faces: np.ndarray,
+    out: np.ndarray, kind: np.ndarray, part: int, start: int, stop: int,
+) -> None:  # fmt: skip
+    """Derivatives (n, c, 3) by the place of what `values` (sites, c) are; 0 where `kind` is 2."""
+    basis, steep, prior, share = np.empty((3, 3)), np.empty((3, 3)), np.empty(27), np.empty(27)
+    rows, off, slope = np.empty(27, np.int64), np.empty((27, 3)), np.empty((27, 3))
+    u, first = np.empty(3), np.empty(3, np.int64)
+    for p in range(start, stop):
+        out[p] = 0.0
+        most = _around(points[p], origin, spacing, site, u, first, basis, rows, prior)
+        kind[p] = 2 if most < 0 else int(most >= inside)
+        if kind[p] == 1:
+            for k in range(27):
+                for d in range(3):
+                    off[k, d] = sites[rows[k], d] - u[d]
+            if not tilt(prior, off, share) <= ENOUGH:
+                kind[p] = 2
+        if kind[p] == 2:
+            continue
+        for d in range(3):
+            t = u[d] - first[d] - 1
+            steep[d, 0], steep[d, 1], steep[d, 2] = t - 0.5, -2 * t, t + 0.5
+        for k in range(27):
+            x, y, z = k // 9, k // 3 % 3, k % 3
+            slope[k, 0] = steep[0, x] * basis[1, y] * basis[2, z]
+            slope[k, 1] = basis[0, x] * steep[1, y] * basis[2, z]
+            slope[k, 2] = basis[0, x] * basis[1, y] * steep[2, z]
+        if kind[p] == 1:
+            _tilted_slopes(slope, prior, share, off)
+        for k in range(27):
+            for j in range(values.shape[1]):
+                for d in range(3):
+                    out[p, j, d] += slope[k, d] * values[rows[k], j] / spacing[d]

@@ -14,6 +14,9 @@ ROOM = 3_000_000
 """Numbers that a batch of points may hold at a time."""
 
 
+SLIVERS = 64
+"""Points in slivers that are looked at together."""
+
 State = tuple[Any, Any, Any]
 
 
@@ -173,6 +176,25 @@ def _between(tables: Tables, u: Float[Array, "b 3"]) -> Float[Array, "b m"]:
     empty = jnp.zeros((len(u), len(tables.corners)))
     columns = jnp.asarray(tables.faces)[face].reshape(len(u), -1)
     return empty.at[rows, columns].add(values) / part.sum(axis=(1, 2))[:, None]
+
+
+def sliver_slopes(
+    tables: Tables, points: Float[np.ndarray, "n 3"], of: Float[np.ndarray, "m c"]
+) -> Float[np.ndarray, "n c 3"]:
+    """Derivatives by the place where only the cage itself encloses a point."""
+    places = (points - tables.origin) / tables.spacing
+    found = [
+        _sliver_slopes(tables, places[k : k + SLIVERS]) for k in range(0, len(places), SLIVERS)
+    ]
+    return np.einsum("dnm,mc->ncd", np.concatenate(found, axis=1), of) / tables.spacing
+
+
+@jax.jit
+def _sliver_slopes(tables: Tables, u: Float[Array, "b 3"]) -> Float[Array, "3 b m"]:
+    def along(axis: Float[Array, "3"]) -> Array:
+        return jax.jvp(lambda u: _between(tables, u), (u,), (jnp.broadcast_to(axis, u.shape),))[1]
+
+    return jax.vmap(along)(jnp.eye(3))
 
 
 def _crossed(corners: Array, u: Array) -> tuple[Array, Array]:

@@ -4,6 +4,8 @@ PYTHON ?= python3
 BIN := .venv/bin
 UV := .uv/bin/uv
 UV_VERSION := 0.13.9
+# four tests at a time at most: what they compile takes a gigabyte or two each
+SPREAD := -n auto --maxprocesses 4 --dist loadfile
 
 .DEFAULT_GOAL := help
 .PHONY: help demo test check slow bench docs blender format lock clean
@@ -28,14 +30,14 @@ demo: .venv/ready  ## deform a transport wing, write its sensitivities, draw pic
 	@$(BIN)/python examples/ex01_transport_wing.py
 
 test: .venv/ready  ## the tests (no GPU, no Blender, no display)
-	@$(BIN)/python -m pytest -m "not slow and not blender"
+	@$(BIN)/python -m pytest $(SPREAD) -m "not slow and not blender"
 
 check: .venv/ready-dev  ## format, lint, types, layers, tests
 	@$(BIN)/ruff format --check .
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
-	@$(BIN)/python -m pytest -q -m "not slow and not blender"
+	@$(BIN)/python -m pytest -q $(SPREAD) -m "not slow and not blender"
 
 slow: .venv/ready  ## everything at full size
 	@$(BIN)/python -m pytest

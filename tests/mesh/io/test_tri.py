@@ -104,6 +104,7 @@ def test_names_that_are_no_numbers_are_numbered(tmp_path, surface):
             SMALL.replace("0 1 0", "0 99999999999999*1 0"),
             "line 4: repeat counts make too many numbers",
         ),
+        (SMALL + "-1e308", "component ids must be whole numbers, found -1e.308"),
         ("999999999 2\n0 0 0\n", "999999999 vertices and 2 triangles need"),
         ("-3 1\n0 0 0\n", "found -3 as the number of vertices"),
         ("3\n", "the header needs 2 numbers, the file has 1"),

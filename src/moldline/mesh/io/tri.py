@@ -31,6 +31,9 @@ SUFFIXES = (".tri", ".triq")
 HOLDS = Surface
 
 
+LARGEST_ID = 2**53
+"""Beyond, doubles are no longer every whole number."""
+
 PROMISE = re.compile(r"\.i\.tri(\.gz)?$", re.IGNORECASE)
 """Names of files that hold components."""
 
@@ -182,8 +185,11 @@ def _surface(counts: Counts, parts: list[np.ndarray], path: Path | str) -> Surfa
     tags, components = None, None
     if counts.has_ids:
         ids = parts[2]
-        if (ids != np.floor(ids)).any():
-            raise FileError(f"{path}: component ids must be whole numbers, found {ids.max():.15g}")
+        wrong = np.flatnonzero((ids != np.floor(ids)) | (np.abs(ids) > LARGEST_ID))
+        if len(wrong):
+            raise FileError(
+                f"{path}: component ids must be whole numbers, found {ids[wrong[0]]:.15g}"
+            )
         names, tags = distinct(ids.astype(np.int64))
         components = tuple(map(str, names.tolist()))
     data = {}

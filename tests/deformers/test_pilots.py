@@ -81,6 +81,17 @@ def test_no_smaller_motion_meets_the_conditions(bent):
     assert np.linalg.norm(across) < 1e-10 * np.linalg.norm(least)
 
 
+def test_nor_where_the_conditions_are_known_to_fewer_digits(body, bent):
+    """Far from the origin a volume has fewer; steps that only seemed to stand still ended there."""
+    far = ml.Surface(np.asarray(body.points) + np.array([100.0, 100.0, 30.0]), body.faces)
+    hidden = ml.Lattice.around(far, (5, 3, 3), margin=0.3)
+    away = Pilots(far, bent.pilots, bent.constraints, hidden)
+    change = np.array([0.6, 0.2])
+    assert away.report(change).status == "met"
+    near = np.asarray(bent.pose(change))
+    np.testing.assert_allclose(away.pose(change), near, atol=1e-10 * np.abs(near).max())
+
+
 def _conditions(pilots):
     bound = pilots.net.bind(pilots.rest)
     return lambda x: jnp.concatenate([measure(bound(x)) for measure in pilots.measures])

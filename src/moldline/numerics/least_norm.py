@@ -79,7 +79,7 @@ class Solution(NamedTuple):
     iterations
         Steps taken.
     size
-        Largest of the last step, relative to x.
+        Largest of the last step, before it is halved, relative to x.
     """
 
     x: Float[Array, "n"]
@@ -96,9 +96,10 @@ def least_norm(
 
     Each step goes to the least x of the linearised conditions, halved until their misses and the
     length together get less. It ends where a step is below `tolerance`, relative to x, and at once
-    where zero misses nothing. Where such steps converge too slowly, Newton's on the equations above
-    follow. `still` is the same problem, closed over what is not differentiated: the search needs no
-    derivatives. `damping` is the part of each miss that a step makes good.
+    where zero misses nothing. Where such steps converge too slowly, or make nothing less, Newton's
+    on the equations above follow. `still` is the same problem, closed over what is not
+    differentiated: the search needs no derivatives. `damping` is the part of each miss that a step
+    makes good.
     """
     found = _polished(still, _search(still, tolerance, damping), tolerance)
     return found._replace(x=_differentiable(problem, still, found))
@@ -121,32 +122,36 @@ def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solu
     def merit(x: Unknown, price: Float[Array, ""]) -> Float[Array, ""]:
         return 0.5 * x @ (weights * x) + price * jnp.sum(_violation(problem, problem.missing(x)))
 
-    def step(state: Solution) -> Solution:
-        x = state.x
+    def step(state: tuple[Solution, Array]) -> tuple[Solution, Array]:
+        now, _ = state
+        x = now.x
         aim, found = target(x)
         price = 2 * jnp.max(jnp.abs(found.values)) + 1e-300
-        before = merit(x, price)
+        # a merit that grows by what its misses are rounded to does not grow
+        most = merit(x, price) * (1 + 1e-12) + price * problem.rounding * len(is_bound)
 
         def worse(trial: tuple[Array, Array]) -> Array:
             length, halvings = trial
             after = merit(x + length * (aim - x), price)
-            return ~(after <= before * (1 + 1e-12)) & (halvings < HALVINGS)
+            return ~(after <= most) & (halvings < HALVINGS)
 
         whole = (jnp.ones(()), jnp.zeros((), int))
-        length, _ = jax.lax.while_loop(worse, lambda t: (t[0] / 2, t[1] + 1), whole)
+        length, halvings = jax.lax.while_loop(worse, lambda t: (t[0] / 2, t[1] + 1), whole)
         new = x + length * (aim - x)
-        size = jnp.max(jnp.abs(new - x)) / (jnp.max(jnp.abs(new)) + 1e-300)
-        return Solution(new, found.values, found.active, state.iterations + 1, size)
+        size = jnp.max(jnp.abs(aim - x)) / (jnp.max(jnp.abs(new)) + 1e-300)
+        steps = now.iterations + 1
+        return Solution(new, found.values, found.active, steps, size), halvings < HALVINGS
 
-    def unfinished(state: Solution) -> Array:
-        return (state.iterations < LIMIT) & ~(state.size <= tolerance)
+    def unfinished(state: tuple[Solution, Array]) -> Array:
+        now, is_better = state
+        return (now.iterations < LIMIT) & ~(now.size <= tolerance) & is_better
 
     start = jnp.zeros(weights.shape)
     missed = jnp.max(_violation(problem, problem.missing(start)))
     begun = jnp.where(missed <= problem.rounding, 0.0, jnp.inf)  # also where it is no number
     none = jnp.zeros(len(is_bound))
     state = Solution(start, none, jnp.asarray(~is_bound), jnp.zeros((), int), begun)
-    return jax.lax.while_loop(unfinished, step, state)
+    return jax.lax.while_loop(unfinished, step, (state, jnp.ones((), bool)))[0]
 
 
 def _violation(problem: Problem, miss: Misses) -> Misses:
@@ -199,7 +204,7 @@ def _polished(problem: Problem, found: Solution, tolerance: float) -> Solution:
 
     def unfinished(state: tuple[Solution, jax.Array]) -> Array:
         now, is_better = state
-        return (now.iterations < LIMIT + POLISHED) & ~(now.size <= tolerance) & is_better
+        return (now.iterations < found.iterations + POLISHED) & ~(now.size <= tolerance) & is_better
 
     return jax.lax.while_loop(unfinished, step, (found, jnp.ones((), bool)))[0]
 

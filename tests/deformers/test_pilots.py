@@ -293,6 +293,14 @@ def test_weights_say_which_controls_move(body, lattice):
     assert motion[: lattice.size // 2].max() < 1e-3 * motion.max()
 
 
+@pytest.mark.parametrize("weight", [1e-12, 1e12])
+def test_only_ratios_of_weights_matter_to_what_is_met(body, lattice, weight):
+    twice = {"one": Position(V(3), "z"), "two": Position(V(3), "z")}
+    pilots = Pilots(body, twice, hidden=lattice, weights=weight)
+    assert pilots.report(np.array([0.1, 0.1001])).unmet == ("one", "two")
+    assert pilots.report(np.array([0.1, 0.1])).status == "met"
+
+
 def test_the_lattice_that_is_made_is_as_fine_as_the_pilots_are_near(body):
     rest = np.asarray(body.points)
     along = [int(np.abs(rest - [x, 0, 0.7 * np.sqrt(1 - x * x / 9)]).sum(1).argmin())

@@ -162,6 +162,7 @@ class Pilots(AbstractPosed):
         costs = np.broadcast_to(np.asarray(weights, float), self.net.size).copy()
         if not np.all(np.isfinite(costs)) or np.any(costs <= 0):
             raise ParameterError("weights of the hidden controls must be above zero")
+        costs /= np.median(costs)  # only their ratios matter, and misses are told in such motions
         self.readings = Readings(self.net, self.measures, self._bound)
         bounded = [c if isinstance(c, Constraint) else None for c in self.constraints.values()]
         named = [*((n, None) for n in self.pilots), *zip(self.constraints, bounded, strict=True)]

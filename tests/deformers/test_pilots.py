@@ -313,6 +313,11 @@ def test_the_lattice_that_is_made_is_as_fine_as_the_pilots_are_near(body):
     assert flat.net.shape[2] == 1
 
 
+def test_pilots_of_the_whole_shape_have_no_places_to_show(body, moved):
+    assert moved.marks(body.points).shape == (2, 3)
+    assert Pilots(body, [Volume(body.faces)]).marks(body.points).shape == (0, 3)
+
+
 def test_what_no_control_reaches_is_told(body):
     local = ml.Lattice.box((2.0, -1, -1), (4, 1, 1), (3, 2, 2))
     with pytest.raises(ParameterError, match="no control of the hidden deformer reaches 'tail'"):

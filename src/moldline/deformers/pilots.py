@@ -241,7 +241,8 @@ class Pilots(AbstractPosed):
     def marks(self, points: Points) -> Array:
         """Where the places are that the pilots hold, for pictures."""
         few = [m for m in self.pilots.values() if len(m.reads) <= SHOWN]
-        return jnp.concatenate([m.marks(jnp.asarray(points)[m.reads]) for m in few])
+        marked = [m.marks(jnp.asarray(points)[m.reads]) for m in few]
+        return jnp.concatenate([jnp.zeros((0, 3)), *marked])
 
     def report(self, controls: Vector, points: Points | None = None) -> PilotReport:
         """How well the conditions are met, on the shape at rest or after earlier stages."""

@@ -166,7 +166,8 @@ def _half(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | None
 def _is_whole(cage: Surface) -> bool:
     faces = np.asarray(cage.faces)
     every_point = len(np.unique(faces)) == len(cage.points)
-    return every_point and is_closed(faces) and not len(nonmanifold_vertices(faces))
+    is_closed_once = bool(np.all(edges(faces).uses == 2))
+    return every_point and is_closed_once and not len(nonmanifold_vertices(faces))
 
 
 def _coarse(fine: Surface, count: int, denser: Sequence[Denser]) -> Surface | None:

@@ -122,7 +122,7 @@ def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solu
     def merit(x: Unknown, price: Float[Array, ""]) -> Float[Array, ""]:
         return 0.5 * x @ (weights * x) + price * jnp.sum(_violation(problem, problem.missing(x)))
 
-    def step(state: tuple[Solution, Array]) -> tuple[Solution, Array]:
+    def step(state: tuple[Solution, jax.Array]) -> tuple[Solution, jax.Array]:
         now, _ = state
         x = now.x
         aim, found = target(x)
@@ -142,7 +142,7 @@ def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solu
         steps = now.iterations + 1
         return Solution(new, found.values, found.active, steps, size), halvings < HALVINGS
 
-    def unfinished(state: tuple[Solution, Array]) -> Array:
+    def unfinished(state: tuple[Solution, jax.Array]) -> Array:
         now, is_better = state
         return (now.iterations < LIMIT) & ~(now.size <= tolerance) & is_better
 

@@ -144,6 +144,20 @@ def test_pilots_behind_another_stage_hold_what_they_prescribe(bent, body):
     assert report.status == "met"
 
 
+def test_behind_another_stage_they_are_compiled_once(body, monkeypatch):
+    calls, plain = [], Volume.of
+    monkeypatch.setattr(Volume, "of", lambda self, places: calls.append(1) or plain(self, places))
+    before = ml.Lattice.around(body, (3, 2, 2), margin=0.1)
+    pilots = Pilots(body, [Position(V(2), "z")], [Volume(body.faces)], before)
+    high = ml.variable("high", size=1, value=0.1)
+    stages = [ml.Stage(before, {}), ml.Stage(pilots, {high: ml.links.controls(pilots)})]
+    case = ml.Pipeline(body, stages)
+    case.points()
+    traced = len(calls)
+    case.points({"high": 0.2})
+    assert len(calls) == traced > 0
+
+
 def test_a_flow_mesh_rides_along(moved, body):
     turn = ml.variable("turn", size=3, value=(0.1, 0.0, 0.2))
     case = ml.Pipeline(body, [ml.Stage(moved, {turn: ml.links.controls(moved)})])

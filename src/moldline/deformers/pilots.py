@@ -132,6 +132,7 @@ class Pilots(AbstractPosed):
     conditions: Conditions = eqx.field(static=True)
     readings: Readings = eqx.field(static=True)
     solver: Callable[[Vector], Solution] = eqx.field(static=True)
+    settler: Callable[[Points, Vector], Solution] = eqx.field(static=True)
     probed: Probe = eqx.field(static=True)
 
     def __init__(
@@ -177,6 +178,7 @@ class Pilots(AbstractPosed):
         self.response = self.conditions.response(slopes)[:, : self.size] if self.is_linear else None
         self.probed = probe(lambda change: self.conditions.problem(self.readings, change))
         self.solver = jax.jit(lambda x: self._solved(self.readings, self.readings, x))
+        self.settler = jax.jit(lambda points, x: self._settled(points, x))
 
     @classmethod
     @override
@@ -227,16 +229,7 @@ class Pilots(AbstractPosed):
         self, points: Points, controls: Vector
     ) -> tuple[AbstractDeformer, Float[Array, "m"]]:
         """The hidden deformer, and the controls that meet the conditions on the present shape."""
-
-        def read(places: Points) -> Readings:
-            def moved(reads: np.ndarray) -> Callable[[Vector], Points]:
-                return lambda x: self.net.follow(places[reads], x)
-
-            return Readings(self.net, self.measures, moved)
-
-        points = jnp.asarray(points)
-        still = read(jax.lax.stop_gradient(points))
-        return self.net, self._solved(read(points), still, jnp.asarray(controls)).x
+        return self.net, self.settler(jnp.asarray(points), jnp.asarray(controls)).x
 
     def marks(self, points: Points) -> Array:
         """Where the places are that the pilots hold, for pictures."""
@@ -252,7 +245,7 @@ class Pilots(AbstractPosed):
         else:
             readings = Readings(self.net, self.measures, lambda r: self.net.bind(points[r]))
             probed = probe(lambda change: asked.problem(readings, change))
-            solution = self._solved(readings, readings, change)
+            solution = self.settler(jnp.asarray(points), change)
         motion = solution.x - jnp.asarray(self.net.neutral)
         scaled = np.zeros(len(asked.labels))
         scaled[asked.equations], over = asked.slack(readings.values(motion), change)
@@ -309,6 +302,17 @@ class Pilots(AbstractPosed):
         steps = jnp.any(change != 0).astype(int)
         x = jnp.asarray(self.net.neutral) + self.response @ change
         return Solution(x, equations, equations == 0, steps, jnp.zeros(()))
+
+    def _settled(self, points: Points, change: Float[Array, "p"]) -> Solution:
+        """On the present shape."""
+
+        def read(places: Points) -> Readings:
+            def moved(reads: np.ndarray) -> Callable[[Vector], Points]:
+                return lambda x: self.net.follow(places[reads], x)
+
+            return Readings(self.net, self.measures, moved)
+
+        return self._solved(read(points), read(jax.lax.stop_gradient(points)), change)
 
     def _solved(self, readings: Readings, still: Readings, change: Float[Array, "p"]) -> Solution:
         """The least controls of the hidden deformer, from its neutral ones."""

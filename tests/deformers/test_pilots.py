@@ -344,5 +344,10 @@ def test_what_no_control_reaches_is_told(body):
         Pilots(body, {"a": V(0)}, step=2.0)
     with pytest.raises(ParameterError, match="must be above zero"):
         Pilots(body, {"a": V(0)}, hidden=local, weights=0.0)
+    with pytest.raises(ParameterError, match=r"pilots measure 3 numbers, got shape \(2,\)"):
+        Pilots(body, {"a": V(0)}).pose(np.zeros(2))
+    for low, high in ((1.0, -1.0), (np.inf, np.inf), (np.nan, 1.0)):
+        with pytest.raises(ParameterError, match="leave no choice"):
+            Constraint(Volume(body.faces), low, high)
     with pytest.raises(ParameterError, match="margin is above zero"):
         Pilots(body, {"a": V(0)}, margin=-1.0)

@@ -222,14 +222,14 @@ class Pilots(AbstractPosed):
 
     @override
     def pose(self, controls: Vector) -> Float[Array, "n"]:
-        return self._solution(jnp.asarray(controls)).x
+        return self._solution(self._asked(controls)).x
 
     @override
     def settle(
         self, points: Points, controls: Vector
     ) -> tuple[AbstractDeformer, Float[Array, "m"]]:
         """The hidden deformer, and the controls that meet the conditions on the present shape."""
-        return self.net, self.settler(jnp.asarray(points), jnp.asarray(controls)).x
+        return self.net, self.settler(jnp.asarray(points), self._asked(controls)).x
 
     def marks(self, points: Points) -> Array:
         """Where the places are that the pilots hold, for pictures."""
@@ -239,7 +239,7 @@ class Pilots(AbstractPosed):
 
     def report(self, controls: Vector, points: Points | None = None) -> PilotReport:
         """How well the conditions are met, on the shape at rest or after earlier stages."""
-        asked, change = self.conditions, jnp.asarray(controls)
+        asked, change = self.conditions, self._asked(controls)
         if points is None:
             readings, probed, solution = self.readings, self.probed, self._solution(change)
         else:
@@ -281,14 +281,20 @@ class Pilots(AbstractPosed):
         largest = np.linalg.norm(moves, axis=1).max()
         return float(largest / motion) if motion > 0 else 0.0
 
+    def _asked(self, controls: Array) -> Array:
+        change = jnp.asarray(controls)
+        if change.shape != (self.size,):
+            raise ParameterError(f"pilots measure {self.size} numbers, got shape {change.shape}")
+        return change
+
     def _status(self, solution: Solution, misses_some: bool, curvature: float) -> str:
         if not float(solution.size) <= SETTLED or not np.all(np.isfinite(solution.x)):
             return "not converged"
         if misses_some:
             return "least squares"
-        forces = np.abs(np.asarray(solution.multipliers))
+        forces = np.asarray(solution.multipliers)
         held = self.conditions.is_bound & np.asarray(solution.active)
-        lets_go = held & (forces <= AT_LIMIT * forces.max(initial=0.0))
+        lets_go = held & (forces <= AT_LIMIT * np.abs(forces).max(initial=0.0))
         return "met" if curvature > 0 and not np.any(lets_go) else "not smooth"
 
     def _bound(self, reads: np.ndarray) -> Callable[[Vector], Points]:

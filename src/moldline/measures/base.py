@@ -89,7 +89,7 @@ class Constraint:
                 f"a measure of {self.measure.size} numbers takes one bound or as many, got "
                 f"{self.lower} and {self.upper}"
             ) from None
-        if np.isnan(low).any() or np.isnan(high).any() or np.any(low > high):
+        if not np.all((low <= high) & (low < np.inf) & (high > -np.inf)):
             raise ParameterError(f"bounds {self.lower} and {self.upper} leave no choice")
         if not 0 < self.weight < np.inf:
             raise ParameterError(f"a weight is above zero, got {self.weight}")

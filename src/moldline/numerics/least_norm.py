@@ -108,24 +108,13 @@ def least_norm(
 def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solution:
     weights, is_bound = problem.weights, problem.is_bound
 
-    def target(x: Unknown) -> tuple[Unknown, Multipliers]:
-        """Of the linearised conditions the least x, and its multipliers."""
-        miss, slopes = problem.evaluated(x)
-        spread = slopes / weights
-        matrix, away = spread @ slopes.T, damping * miss - slopes @ x
-        if is_bound.any():
-            found = multipliers(matrix, away, is_bound, problem.rounding)
-        else:
-            found = Multipliers(jnp.linalg.solve(matrix, away), jnp.asarray(~is_bound))
-        return -(found.values @ spread), found
-
     def merit(x: Unknown, price: Float[Array, ""]) -> Float[Array, ""]:
         return 0.5 * x @ (weights * x) + price * jnp.sum(_violation(problem, problem.missing(x)))
 
     def step(state: tuple[Solution, jax.Array]) -> tuple[Solution, jax.Array]:
         now, _ = state
         x = now.x
-        aim, found = target(x)
+        aim, found = _target(problem, damping, x)
         price = 2 * jnp.max(jnp.abs(found.values)) + 1e-300
         # a merit that grows by what its misses are rounded to does not grow
         most = merit(x, price) * (1 + 1e-12) + price * problem.rounding * len(is_bound)
@@ -154,6 +143,18 @@ def _search(problem: Problem, tolerance: float, damping: Misses | float) -> Solu
     return jax.lax.while_loop(unfinished, step, (state, jnp.ones((), bool)))[0]
 
 
+def _target(problem: Problem, damping: Misses | float, x: Unknown) -> tuple[Unknown, Multipliers]:
+    """Of the linearised conditions the least x, and its multipliers."""
+    miss, slopes = problem.evaluated(x)
+    spread = slopes / problem.weights
+    matrix, away = spread @ slopes.T, damping * miss - slopes @ x
+    if problem.is_bound.any():
+        found = multipliers(matrix, away, problem.is_bound, problem.rounding)
+    else:
+        found = Multipliers(jnp.linalg.solve(matrix, away), jnp.asarray(~problem.is_bound))
+    return -(found.values @ spread), found
+
+
 def _violation(problem: Problem, miss: Misses) -> Misses:
     return jnp.where(problem.is_bound, jnp.maximum(miss, 0.0), jnp.abs(miss))
 
@@ -173,11 +174,12 @@ def _flat(problem: Problem, active: Bool[Array, "k"], x: Unknown) -> Callable[[B
     slopes = jnp.where(active[:, None], problem.evaluated(x)[1], 0.0)
     spread = slopes / weights
     small = spread @ slopes.T + jnp.diag(jnp.where(active, 0.0, 1.0))
+    factors = jax.scipy.linalg.lu_factor(small)
 
     def inverse(vector: Both) -> Both:
         one, other = vector[:count], vector[count:]
         right = jnp.where(active, spread @ one - other, other)
-        inner = jnp.linalg.solve(small, right)
+        inner = jax.scipy.linalg.lu_solve(factors, right)
         return jnp.concatenate([(one - slopes.T @ inner) / weights, inner])
 
     return inverse

@@ -101,7 +101,7 @@ class Pilots(AbstractPosed):
     pilots
         Measures by name.
     constraints
-        What is kept, by name; None where it is kept as it is at rest.
+        What is kept, by name: a measure as it is at rest, a constraint within its bounds.
     rest
         Points of the shape at rest.
     measured

@@ -30,7 +30,6 @@ class _Group:
         measures: Sequence[AbstractMeasure],
         moved: Callable[[np.ndarray], Callable[[Controls], Points]],
     ):
-        self.numbers = numbers
         self.measures = [measures[n] for n in numbers]
         reads = np.unique(np.concatenate([m.reads for m in self.measures]).astype(int))
         self.rows = [np.searchsorted(reads, m.reads) for m in self.measures]
@@ -64,7 +63,6 @@ class Readings:
         moved: Callable[[np.ndarray], Callable[[Controls], Points]],
     ):
         """`moved` gives for numbers of points how the deformer moves these."""
-        self.measures = tuple(measures)
         self.neutral = jnp.asarray(deformer.neutral)
         is_net = isinstance(deformer, AbstractControlNet)
         few = [n for n, m in enumerate(measures) if len(m.reads) <= FEW]

@@ -6,7 +6,7 @@ from typing import Any
 
 from .errors import ParameterError
 
-GROUPS = {"deformers": "moldline.deformers", "measures": "moldline.measures"}
+GROUPS = {kind: f"moldline.{kind}" for kind in ("deformers", "measures", "modelers")}
 
 
 def deformers() -> list[str]:
@@ -19,6 +19,11 @@ def measures() -> list[str]:
     return _names("measures")
 
 
+def modelers() -> list[str]:
+    """Names of all installed modelers."""
+    return _names("modelers")
+
+
 def deformer(name: str) -> Any:
     """The deformer that is installed under a name."""
     return _named("deformers", name)
@@ -27,6 +32,11 @@ def deformer(name: str) -> Any:
 def measure(name: str) -> Any:
     """The measure that is installed under a name."""
     return _named("measures", name)
+
+
+def modeler(name: str) -> Any:
+    """The modeler that is installed under a name."""
+    return _named("modelers", name)
 
 
 def _names(kind: str) -> list[str]:

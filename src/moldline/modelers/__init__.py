@@ -1,0 +1,1 @@
+"""CONSTRUCT: what makes a geometry from parameters, or from other geometries."""

@@ -1,16 +1,32 @@
 """An airfoil from what one calls it: a designation, a file of coordinates, or options."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import registry
 from ..errors import ParameterError
 from .airfoil import AbstractAirfoil
+from .kulfan import Kulfan
 from .naca4 import Naca4
+from .naca5 import Naca5
+from .naca_modified import NacaModified
+from .tabulated import Tabulated, table, tables
 
-KNOWN = "a NACA number such as 2412"
+FAMILIES: dict[str, type[AbstractAirfoil]] = {
+    "naca4": Naca4,
+    "naca5": Naca5,
+    "naca_modified": NacaModified,
+    "kulfan": Kulfan,
+    "tabulated": Tabulated,
+}
+"""Families by the name that a mapping gives; others' are classes of their own."""
+
+_DESIGNATIONS: list[tuple[str, type[AbstractAirfoil]]] = [
+    (r"(?:naca)?-?(\d{4}-?\d{2})", NacaModified),
+    (r"(?:naca)?-?(\d{5})", Naca5),
+    (r"(?:naca)?-?(\d{4})", Naca4),
+]
 
 
 def airfoil(given: Any, folder: Path = Path(), **options: Any) -> AbstractAirfoil:
@@ -22,21 +38,45 @@ def airfoil(given: Any, folder: Path = Path(), **options: Any) -> AbstractAirfoi
     that text may say, with options beside it.
     """
     if isinstance(given, AbstractAirfoil):
+        if options:
+            raise ParameterError(
+                f"{given.name} is an airfoil already; options {', '.join(options)} come too late"
+            )
         return given
     if isinstance(given, Mapping):
         own = dict(given)
-        family = own.pop("airfoil", None)
-        if family is None:
-            raise ParameterError(f"options of an airfoil must name it, airfoil = ..., got {given}")
-        return airfoil(family, folder, **(options | own))
-    if isinstance(given, str) and given in registry.modelers():
-        return registry.modeler(given).build(folder, **options)
-    plain = re.sub(r"[^a-z0-9()]", "", str(given).lower())
-    for pattern, make in _FAMILIES:
-        found = re.fullmatch(pattern, plain)
+        if "airfoil" not in own:
+            raise ParameterError(
+                f"options of an airfoil need airfoil = its family or name beside them; got "
+                f"{', '.join(map(str, own)) or 'none'}"
+            )
+        return airfoil(own.pop("airfoil"), folder, **(options | own))
+    said = str(given)
+    if said in FAMILIES:
+        return _built(FAMILIES[said], folder, options)
+    if said.lower().endswith(".dat") or table(said) is not None:
+        return _built(Tabulated, folder, {"section": said, **options})
+    short = re.sub(r"[\s_]", "", said.lower())
+    for pattern, family in _DESIGNATIONS:
+        found = re.fullmatch(pattern, short)
         if found:
-            return make(found[1], **options)
-    raise ParameterError(f"no airfoil is known as {given!r}; known are {KNOWN}")
+            return _built(family, folder, {"designation": found[1], **options})
+    raise ParameterError(
+        f"no airfoil is known as {said!r}. Known are NACA's of four digits (2412), of five (23012) "
+        f"and modified (0012-64), {', '.join(tables())}, files that end in .dat, and "
+        f"the families {', '.join(FAMILIES)} with their options"
+    )
 
 
-_FAMILIES: list[tuple[str, Callable[..., AbstractAirfoil]]] = [(r"(?:naca)?(\d{4})", Naca4)]
+def _built(
+    family: type[AbstractAirfoil], folder: Path, options: Mapping[str, Any]
+) -> AbstractAirfoil:
+    unknown = [name for name in options if name not in family.options()]
+    if unknown:
+        raise ParameterError(
+            f"{family.__name__} has no option {', '.join(unknown)}; it has "
+            f"{', '.join(family.options())}"
+        )
+    made = family.build(folder, **options)
+    assert isinstance(made, AbstractAirfoil)
+    return made

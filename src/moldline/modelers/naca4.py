@@ -61,7 +61,7 @@ class Naca4(AbstractAirfoil):
         base_points: int = 0,
         chord: float = 1.0,
     ):
-        own = _read(designation)
+        own = read_four(designation)
         self.camber = float(own[0] if camber is None else camber)
         self.crest = float(own[1] if crest is None else crest)
         self.thickness = float(own[2] if thickness is None else thickness)
@@ -134,7 +134,7 @@ def digits(designation: Any, count: int, example: str) -> list[int]:
     return [int(d) for d in found]
 
 
-def _read(designation: Any) -> tuple[float, float, float]:
+def read_four(designation: Any) -> tuple[float, float, float]:
     first, second, *last = digits(designation, 4, "2412")
     if bool(first) != bool(second):
         raise ParameterError(

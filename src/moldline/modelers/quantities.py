@@ -1,0 +1,97 @@
+"""The named numbers that a shape is made of, in one vector."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from .._types import Array, Vector
+from ..errors import ParameterError
+
+
+class Quantities(eqx.Module):
+    """Numbers under names, one after another.
+
+    What was given as one number for all of its places stays one number; a list has one each.
+
+    Attributes
+    ----------
+    names
+        In the order of their numbers.
+    numbers
+        Each name's own values [m, rad, 1].
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    numbers: tuple[np.ndarray, ...]
+
+    def __init__(self, given: Mapping[str, Any]):
+        self.names = tuple(given)
+        self.numbers = tuple(np.array(given[name], float).ravel() for name in given)
+        for name, own in zip(self.names, self.numbers, strict=True):
+            if not np.isfinite(own).all():
+                raise ParameterError(f"{name} must be finite numbers, got {own.tolist()}")
+
+    @property
+    def rows(self) -> dict[str, np.ndarray]:
+        """Which numbers of the vector each name has."""
+        ends = np.cumsum([0, *map(len, self.numbers)])
+        return {name: np.arange(ends[i], ends[i + 1]) for i, name in enumerate(self.names)}
+
+    @property
+    def values(self) -> Float[np.ndarray, "k"]:
+        """All of them."""
+        return np.concatenate([np.asarray(own) for own in self.numbers])
+
+    def parted(self, vector: Vector) -> dict[str, Array]:
+        """The numbers of each name, out of other ones in the same order."""
+        vector = jnp.asarray(vector)
+        size = sum(map(len, self.numbers))
+        if vector.shape != (size,):
+            raise ParameterError(
+                f"this shape has {size} parameters ({', '.join(self.names)}), got "
+                f"{vector.size} numbers"
+            )
+        return {name: vector[rows[0] : rows[-1] + 1] for name, rows in self.rows.items()}
+
+
+def spread(name: str, given: Any, count: int, what: str) -> Float[np.ndarray, "_"]:
+    """One number for all, or one each."""
+    numbers = np.array(given, float)
+    if numbers.shape not in ((), (1,), (count,)):
+        raise ParameterError(
+            f"{name} takes one number for all or {count}, one for each {what}; got {given}"
+        )
+    return np.atleast_1d(numbers)
+
+
+def positive(name: str, numbers: np.ndarray, unit: str = "m") -> None:
+    """Refuse sizes that are not above 0."""
+    if not np.all(numbers > 0):
+        raise ParameterError(f"{name} must be above 0 [{unit}], got {numbers.tolist()}")
+
+
+def reaches(name: str, given: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """How far stations are from the first, and what takes numbers to the places of all stations.
+
+    One number is the last one's distance, with the others spread evenly between; a list has the
+    distance of each station but the first.
+    """
+    numbers = np.array(given, float)
+    if numbers.ndim == 0:
+        positive(name, numbers[None])
+        return numbers[None], np.linspace(0.0, 1.0, count)[:, None]
+    if numbers.shape != (count - 1,):
+        raise ParameterError(
+            f"{name} takes one number, or the distance from the first station of each of the "
+            f"{count - 1} others; got {given}"
+        )
+    if not np.all(np.diff(numbers, prepend=0.0) > 0):
+        raise ParameterError(
+            f"{name} has the distances of stations from the first one, ascending and above 0 [m]; "
+            f"got {numbers.tolist()}"
+        )
+    return numbers, np.eye(count)[:, 1:]

@@ -33,12 +33,11 @@ def row_places(
     shares = np.interp(stations, run, fine)
     counts = np.maximum(1, np.rint(np.diff(shares) * count).astype(int))
     counts[np.argmax(counts)] += max(count - counts.sum(), 1 - counts.max())
-    parts = [
-        np.interp(np.linspace(*shares[k : k + 2], n, endpoint=False), fine, run)
-        for k, n in enumerate(counts.tolist())
-    ]
-    for k, part in enumerate(parts):
-        part[0] = stations[k]
+    parts = []
+    for k, number in enumerate(counts.tolist()):
+        even = shares[k] + (shares[k + 1] - shares[k]) * np.arange(number) / number
+        parts.append(np.interp(even, fine, run))
+        parts[k][0] = stations[k]
     return np.concatenate([*parts, stations[-1:]])
 
 

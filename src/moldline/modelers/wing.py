@@ -45,7 +45,7 @@ class Wing(AbstractShape):
     Parameters are what was given, under the same names: `span`, `chord`, `sweep`, `dihedral`,
     `twist`, `thickness`, `camber`, `origin`; then the airfoils' own, such as "section 2 upper", if
     `section_parameters` says so. What was given as one number is one parameter for all stations or
-    panels, a list has one for each: the user decides whether a wing has five parameters or hundreds.
+    panels, a list has one for each: so a wing has five parameters, or hundreds.
 
     Attributes
     ----------
@@ -121,22 +121,31 @@ class Wing(AbstractShape):
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
         _choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
-        given = {"chord": chord, "twist": twist, "thickness": thickness, "camber": camber}
-        count = _count(span, given, {"sweep": sweep, "dihedral": dihedral}, airfoil)
+        panels: dict[str, Any] = {"sweep": sweep, "dihedral": dihedral}
+        each: dict[str, Any] = {"chord": chord, "twist": twist, "thickness": thickness}
+        each["camber"] = camber
+        count = _count(span, each, panels, airfoil)
         self._sections(airfoil, count, section_parameters, chordwise, spacing)
-        own = {"span": 0.0, "chord": 0.0, "sweep": sweep, "dihedral": dihedral}
-        own["span"], self.reach = reaches("span", span, count)
-        shown = np.unique(self.thick) if np.ptp(self.thick) == 0 else self.thick
-        given["thickness"] = shown if thickness is None else thickness
-        own |= {key: spread(key, value, count, "station") for key, value in given.items()}
-        for key in ("sweep", "dihedral"):
-            own[key] = _leaning(key, spread(key, own[key], count - 1, "panel"))
+        reach, self.reach = reaches("span", span, count)
+        self._numbers(reach, each, panels, _origin(origin, sides))
+        self._rows(reach, spanwise, clustering, loft, tip)
+        self.layout = self._laid(base_points, tip, root, sides)
+
+    def _numbers(
+        self, reach: np.ndarray, each: dict[str, Any], panels: dict[str, Any], origin: np.ndarray
+    ) -> None:
+        """Name the parameters."""
+        count = len(self.thick)
+        if each["thickness"] is None:
+            each["thickness"] = self.thick[:1] if np.ptp(self.thick) == 0 else self.thick
+        own = {key: spread(key, given, count, "station") for key, given in each.items()}
+        for key, given in panels.items():
+            own[key] = _leaning(key, spread(key, given, count - 1, "panel"))
         positive("chord", own["chord"])
         positive("thickness", own["thickness"], "of the chord")
-        own["origin"] = _origin(origin, sides)
-        self.quantities = Quantities(own | self._exposed())
-        self._rows(own["span"], spanwise, clustering, loft, tip)
-        self.layout = self._laid(base_points, tip, root, sides)
+        names = ("chord", "sweep", "dihedral", "twist", "thickness", "camber")
+        shape = {"span": reach} | {key: own[key] for key in names} | {"origin": origin}
+        self.quantities = Quantities(shape | self._exposed())
 
     def _sections(
         self, airfoil: Any, count: int, wanted: bool | list[str], chordwise: int, spacing: Any
@@ -186,7 +195,7 @@ class Wing(AbstractShape):
                 "is sharp"
             )
         ends = {"tip": (-1, tip), "root": (0, "flat")}
-        edges = {k: cap_edges(*self._scaled()[s], how, blunt) for k, (s, how) in ends.items()}
+        edges = {k: self._edges(s, how) for k, (s, how) in ends.items()}
         return WingLayout(
             rows=len(self.weights),
             side=len(self.stations),
@@ -199,9 +208,11 @@ class Wing(AbstractShape):
             is_whole=sides == 2,
         )
 
-    def _scaled(self) -> np.ndarray:
-        """The airfoils with the thickness and camber asked for."""
-        return np.asarray(self._outlines(self.quantities.parted(self.values)))
+    def _edges(self, station: int, kind: str) -> tuple[int, ...]:
+        """Edges across a cap at a station, by the section with the thickness asked for."""
+        outlines = np.asarray(self._outlines(self.quantities.parted(self.values)))
+        upper, lower = outlines[station]
+        return cap_edges(upper, lower, kind, self.airfoils[0].is_blunt)
 
     @classmethod
     @override

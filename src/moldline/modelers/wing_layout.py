@@ -1,5 +1,6 @@
 """The points of a wing in their order, and the triangles between them."""
 
+from itertools import pairwise
 from typing import Literal
 
 import equinox as eqx
@@ -56,10 +57,10 @@ class WingLayout(eqx.Module):
         share = jnp.linspace(0, 1, self.base + 2)[1:-1, None]
         ends = (upper[:, -1:], lower[:, -1:])
         base = (1 - share) * ends[0] + share * ends[1]
-        rows = [upper, lower[:, 1:last], base]
+        rows: list[Array] = [upper, lower[:, 1:last], base]
         if self.tip == "closed":
             rows = [part[:-1] for part in rows]
-        parts = [jnp.concatenate(rows, axis=1).reshape(-1, 3)]
+        parts: list[Array] = [jnp.concatenate(rows, axis=1).reshape(-1, 3)]
         if self.tip == "closed":
             parts.append(upper[-1])
         else:
@@ -187,4 +188,4 @@ def cap_edges(upper: np.ndarray, lower: np.ndarray, kind: str, is_blunt: bool) -
 
 
 def _neighbours(columns: list[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
-    return list(zip(columns[:-1], columns[1:], strict=True))
+    return list(pairwise(columns))

@@ -34,9 +34,22 @@ if TYPE_CHECKING:
     from .mesh.io import read, write
     from .mesh.io.sensitivities import read_sensitivities, write_sensitivities
     from .mesh.planform import Planform, planform
+    from .modelers.airfoils import airfoil
+    from .modelers.base import AbstractModeler
+    from .modelers.body import Body
+    from .modelers.kulfan import Kulfan
+    from .modelers.naca4 import Naca4
+    from .modelers.naca5 import Naca5
+    from .modelers.naca_modified import NacaModified
+    from .modelers.nacelle import Nacelle
+    from .modelers.subdivision import Subdivision
+    from .modelers.tabulated import Tabulated
+    from .modelers.union import Union
+    from .modelers.wing import Wing
     from .parameters import links
     from .parameters.link import Link
     from .parameters.variable import Variable, variable
+    from .pipeline.construction import Construction
     from .pipeline.measurements import Measurements
     from .pipeline.pipeline import Pipeline
     from .pipeline.stage import Stage
@@ -44,33 +57,46 @@ if TYPE_CHECKING:
 _HOMES = {
     "AbstractBinding": "deformers.base",
     "AbstractDeformer": "deformers.base",
+    "AbstractModeler": "modelers.base",
     "AbstractNumpyDeformer": "deformers.foreign",
+    "Body": "modelers.body",
     "BodySkeleton": "deformers.body_skeleton",
     "Bone": "deformers.bones",
     "Bones": "deformers.bones",
     "Cage": "deformers.cage",
     "Cloud": "mesh",
     "Constraint": "measures.base",
+    "Construction": "pipeline.construction",
     "ControlVolume": "deformers.control_volume",
     "DirectSkeleton": "deformers.direct_skeleton",
     "Geometry": "mesh",
     "Grid": "mesh",
     "Hinge": "deformers.hinge",
+    "Kulfan": "modelers.kulfan",
     "Lattice": "deformers.lattice",
     "LinearBinding": "deformers.base",
     "Link": "parameters.link",
     "Measurements": "pipeline.measurements",
+    "Naca4": "modelers.naca4",
+    "Naca5": "modelers.naca5",
+    "NacaModified": "modelers.naca_modified",
+    "Nacelle": "modelers.nacelle",
     "Pilots": "deformers.pilots",
-    "Planform": "mesh.planform",
     "Pipeline": "pipeline.pipeline",
+    "Planform": "mesh.planform",
     "Section": "mesh",
     "Skeleton": "deformers.skeleton",
     "Spot": "measures.spot",
     "Stage": "pipeline.stage",
+    "Subdivision": "modelers.subdivision",
     "Surface": "mesh",
+    "Tabulated": "modelers.tabulated",
+    "Union": "modelers.union",
     "Variable": "parameters.variable",
     "VolumeMesh": "mesh",
+    "Wing": "modelers.wing",
     "WingSkeleton": "deformers.wing_skeleton",
+    "airfoil": "modelers.airfoils",
     "errors": "",
     "links": "parameters",
     "load": "case",

@@ -184,7 +184,8 @@ def test_rubbish_is_refused(folder, content):
     ("content", "message"),
     [
         (b"", "cannot be read: the file is empty"),
-        (b"\n", "geometry: it must be there"),
+        (b"\n", "moldline: it must be there"),
+        (b"moldline = 1\n", "a pipeline needs a geometry, or a stage that makes one"),
         (b"\xff\xfe", "not a text file: byte 0 is not UTF-8"),
         (b"\x1f\x8b\x08", "cannot be read: damaged gzip data"),
         (b"a = " + b"[" * 100_000, "not TOML: nested too deep"),

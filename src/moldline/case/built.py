@@ -1,4 +1,4 @@
-"""Deformers and measures from the tables of a case file, one within another."""
+"""Deformers, modelers and measures from the tables of a case file, one within another."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +11,7 @@ from ..deformers.base import AbstractDeformer
 from ..errors import CaseError, MoldlineError
 from ..measures.base import AbstractMeasure, Constraint
 from ..mesh import Geometry
+from ..modelers.base import AbstractModeler
 from . import options, schema
 from .options import DeformerTable, MeasureTable
 
@@ -18,6 +19,20 @@ from .options import DeformerTable, MeasureTable
 def deformer(file: str, where: str, table: Any, geometry: Geometry) -> AbstractDeformer:
     """From a table with its name under `deformer` and its own options beside it."""
     return _built(file, where, registry.deformer, table.deformer, table, geometry)
+
+
+def modeler(file: str, where: str, table: Any) -> AbstractModeler:
+    """From a table with its name under `modeler` and its own options beside it."""
+    try:
+        cls = registry.modeler(table.modeler)
+        given = schema.checked(
+            options.of_class(table.modeler, cls), table.model_extra or {}, file, where
+        )
+        return cls.build(Path(file).parent, **given)
+    except MoldlineError as error:
+        if isinstance(error, CaseError):
+            raise
+        raise CaseError(f"{file}: {where}: {error}") from None
 
 
 def measure(
@@ -35,16 +50,28 @@ def measure(
 
 
 def relocated(value: Any, folder: Path) -> Any:
-    """Tables of deformers and measures for a case file elsewhere: their paths from `folder`."""
+    """Tables of stages and measures for a case file elsewhere: their paths from `folder`."""
     if isinstance(value, list):
         return [relocated(one, folder) for one in value]
     if not isinstance(value, dict):
         return value
+    if "modeler" in value:
+        return {key: _sections(one, folder) for key, one in value.items()}
     names = _paths(value)
     return {
         key: str((folder / one).resolve()) if key in names else relocated(one, folder)
         for key, one in value.items()
     }
+
+
+def _sections(value: Any, folder: Path) -> Any:
+    """A modeler's options, whose only paths are those of airfoils."""
+    if isinstance(value, list):
+        return [_sections(one, folder) for one in value]
+    if isinstance(value, dict):
+        return {key: _sections(one, folder) for key, one in value.items()}
+    is_path = isinstance(value, str) and value.lower().endswith(".dat")
+    return str((folder / value).resolve()) if is_path else value
 
 
 def _paths(table: dict[str, Any]) -> set[str]:

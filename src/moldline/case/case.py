@@ -1,7 +1,8 @@
 """A case: what a case file describes, ready to run."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,17 @@ from ..errors import CaseError, MoldlineError, ParameterError
 from ..mesh import Cloud, Geometry
 from ..mesh.io import METRES, found, mapped, read
 from ..mesh.io.files import replacing
+from ..modelers.base import AbstractModeler
 from ..parameters.link import Link
 from ..parameters.links import LINKS, mirrored
 from ..parameters.variable import Variable, variable
-from ..pipeline.measurements import Measurements
+from ..pipeline.assembly import Assembly
+from ..pipeline.construction import Construction
+from ..pipeline.measurements import Maker, Measurements
 from ..pipeline.pipeline import Pipeline
 from ..pipeline.stage import Stage
 from . import built, options, schema
+from .options import MeasureTable
 
 
 @dataclass(frozen=True)
@@ -54,7 +59,8 @@ class Case:
         """The unit of the resulting geometry's file, or of a rider's."""
         if rider is not None:
             return self.tables.rider[rider].units
-        return self.tables.geometry[self.pipeline.result].units
+        table = self.tables.geometry.get(self.pipeline.result)
+        return None if table is None else table.units
 
     def values(self, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """The case's values with some replaced; a value outside its bounds is refused."""
@@ -89,7 +95,7 @@ class Case:
             tables["variable"][name]["value"] = np.asarray(checked).tolist()
         target = Path(path)
         if target.parent.resolve() != self.path.parent.resolve():
-            for table in (*tables["geometry"].values(), *tables.get("rider", {}).values()):
+            for table in (*tables.get("geometry", {}).values(), *tables.get("rider", {}).values()):
                 table["file"] = str((self.path.parent / table["file"]).resolve())
             for kind in ("stage", "measure"):
                 if kind in tables:
@@ -112,25 +118,25 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
         for name, table in tables.geometry.items()
     }
     variables = {name: _variable(file, name, table) for name, table in tables.variable.items()}
-    stages = [
-        _stage(file, f"stage.{i}", table, geometries, variables, sampled)
-        for i, table in enumerate(tables.stage)
-    ]
-    unused = variables.keys() - {v.name for stage in stages for v in stage.links}
+    assembly = Assembly(geometries)
+    for i, table in enumerate(tables.stage):
+        where = f"stage.{i}"
+        with _told(file, where):
+            if isinstance(table, schema.ConstructionTable):
+                assembly.add(_construction(file, where, table, variables, sampled))
+            else:
+                assembly.add(_stage(file, where, table, assembly, variables, sampled))
+    unused = variables.keys() - assembly.variables.keys()
     if unused:
         raise CaseError(
             f"{file}: variable.{sorted(unused)[0]}: no stage has a link to it, so it moves nothing"
         )
-    try:
-        pipeline = Pipeline(geometries, stages)
+    with _told(file):
+        pipeline = Pipeline(assembly, [])
         riders = {
             name: pipeline.embed(_read(place, table, f"rider.{name}", sampled), table.on, name)
             for name, table in tables.rider.items()
         }
-    except MoldlineError as error:
-        if isinstance(error, CaseError):
-            raise
-        raise CaseError(f"{file}: {error}") from None
     return Case(place, tables, pipeline, riders, _measurements(file, tables, pipeline, sampled))
 
 
@@ -139,13 +145,11 @@ def _measurements(
 ) -> Measurements:
     if sampled:
         return Measurements(pipeline, {})
-    return Measurements(
-        pipeline,
-        {
-            name: built.measure(file, f"measure.{name}", table, pipeline.geometry)
-            for name, table in tables.measure.items()
-        },
-    )
+
+    def maker(name: str, table: MeasureTable) -> Maker:
+        return lambda geometry: built.measure(file, f"measure.{name}", table, geometry)
+
+    return Measurements(pipeline, {k: maker(k, table) for k, table in tables.measure.items()})
 
 
 def _read(
@@ -171,64 +175,100 @@ def _variable(file: str, name: str, table: schema.VariableTable) -> Variable:
         raise CaseError(f"{file}: variable.{name}: {error}") from None
 
 
+def _construction(
+    file: str,
+    where: str,
+    table: schema.ConstructionTable,
+    variables: dict[str, Variable],
+    sampled: bool,
+) -> Construction:
+    if sampled:
+        raise ParameterError("a case that makes its geometry has no file to stream")
+    modeler = built.modeler(file, where, table)
+    return Construction(
+        modeler, _links(file, where, table, modeler, variables), table.to, table.of, table.name
+    )
+
+
 def _stage(
     file: str,
     where: str,
     table: schema.StageTable,
-    geometries: dict[str, Geometry],
+    assembly: Assembly,
     variables: dict[str, Variable],
     sampled: bool,
 ) -> Stage:
-    on = table.on or (next(iter(geometries)) if len(geometries) == 1 else "")
-    if on not in geometries:
-        raise CaseError(
-            f"{file}: {where}.on: got {table.on!r}, expected one of {', '.join(geometries)}"
+    names = assembly.names
+    on = table.on or (names[0] if len(names) == 1 else "")
+    if on not in names:
+        raise CaseError(f"{file}: {where}.on: got {table.on!r}, expected one of {', '.join(names)}")
+    cls = registry.deformer(table.deformer)
+    if sampled and cls.settle is not AbstractDeformer.settle:
+        raise ParameterError(
+            "this deformer must see the whole geometry, which is not there when it is streamed"
         )
-    try:
-        cls = registry.deformer(table.deformer)
-        if sampled and cls.settle is not AbstractDeformer.settle:
-            raise ParameterError(
-                "this deformer must see the whole geometry, which is not there when it is streamed"
+    deformer = built.deformer(file, where, table, assembly.geometry(on))
+    links = _links(file, where, table, deformer, variables)
+    return Stage(deformer, links, on, table.name, table.carried)
+
+
+def _links(
+    file: str,
+    where: str,
+    table: schema.StageTable | schema.ConstructionTable,
+    turned: AbstractDeformer | AbstractModeler,
+    variables: dict[str, Variable],
+) -> dict[Variable, Link]:
+    links: dict[Variable, Link] = {}
+    for i, row in enumerate(table.link):
+        place = f"{where}.link.{i}"
+        if row.variable not in variables:
+            raise CaseError(
+                f"{file}: {place}.variable: got {row.variable!r}, expected one of "
+                f"{', '.join(variables)}"
             )
-        deformer = built.deformer(file, where, table, geometries[on])
-        links: dict[Variable, Link] = {}
-        for i, row in enumerate(table.link):
-            place = f"{where}.link.{i}"
-            if row.variable not in variables:
-                raise CaseError(
-                    f"{file}: {place}.variable: got {row.variable!r}, expected one of "
-                    f"{', '.join(variables)}"
-                )
-            known = variables[row.variable]
-            link = _link(file, place, row, deformer)
-            links[known] = links[known] + link if known in links else link
-        return Stage(deformer, links, on, table.name, table.carried)
+        known = variables[row.variable]
+        link = _link(file, place, row, turned)
+        links[known] = links[known] + link if known in links else link
+    return links
+
+
+@contextmanager
+def _told(file: str, where: str = "") -> Iterator[None]:
+    """Errors with the file and the place in it."""
+    try:
+        yield
     except MoldlineError as error:
         if isinstance(error, CaseError):
             raise
-        raise CaseError(f"{file}: {where}: {error}") from None
+        raise CaseError(f"{file}: {where}{where and ': '}{error}") from None
 
 
-def _link(file: str, where: str, table: schema.LinkTable, deformer: AbstractDeformer) -> Link:
+def _link(
+    file: str,
+    where: str,
+    table: schema.LinkTable,
+    turned: AbstractDeformer | AbstractModeler,
+) -> Link:
     function = LINKS[table.link]
     model = options.of_link(table.link, function)
     given = schema.checked(model, table.model_extra or {}, file, where)
-    serves = options.deformer_of_link(function)
-    if not isinstance(deformer, serves):
-        others = [k for k, f in LINKS.items() if isinstance(deformer, options.deformer_of_link(f))]
+    if not isinstance(turned, serves := options.classes_of_link(function)):
+        fit = [k for k, f in LINKS.items() if isinstance(turned, options.classes_of_link(f))]
         raise CaseError(
-            f"{file}: {where}.link: {table.link!r} is for a {serves.__name__}, the stage has a "
-            f"{type(deformer).__name__}; it takes {', '.join(others)}"
+            f"{file}: {where}.link: {table.link!r} is for a "
+            f"{' or '.join(cls.__name__ for cls in serves)}, the stage has a "
+            f"{type(turned).__name__}; it takes {', '.join(fit)}"
         )
-    link = function(deformer, **given) * table.scale
+    link = function(turned, **given) * table.scale
     if not table.mirrored:
         return link
-    if not isinstance(deformer, AbstractControlNet):
+    if not isinstance(turned, AbstractControlNet):
         raise CaseError(
             f"{file}: {where}.mirrored: this is for control points, the stage has a "
-            f"{type(deformer).__name__}"
+            f"{type(turned).__name__}"
         )
-    return mirrored(deformer, link, table.mirrored)
+    return mirrored(turned, link, table.mirrored)
 
 
 def _without_none(table: Any) -> Any:

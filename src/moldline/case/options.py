@@ -11,10 +11,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from ..deformers.base import AbstractDeformer
 from ..measures.base import AbstractMeasure
+from ..modelers.base import AbstractModeler
 from ..parameters.links import chosen_controls
 
 Numbers = float | list[Any]
 Pair = tuple[float, float]
+
+
+DEFORMS, MAKES = "<deforms>", "<makes>"
+"""What the two kinds of stages are called among the places of errors, and nowhere else."""
 
 
 class DeformerTable(BaseModel):
@@ -50,25 +55,28 @@ def model_of(name: str, parameters: Mapping[str, inspect.Parameter]) -> type[Bas
     return create_model(name, __base__=_Closed, **fields)
 
 
-def of_class(name: str, cls: type[AbstractDeformer | AbstractMeasure]) -> type[BaseModel]:
-    """What a case file may say to build a deformer or a measure."""
+Kind = type[AbstractDeformer | AbstractMeasure | AbstractModeler]
+
+
+def of_class(name: str, cls: Kind) -> type[BaseModel]:
+    """What a case file may say to build a deformer, a measure or a modeler."""
     return model_of(name, cls.options())
 
 
-def paths(cls: type[AbstractDeformer | AbstractMeasure]) -> dict[str, Any]:
+def paths(cls: Kind) -> dict[str, Any]:
     """Options that are paths, and what they are where a case file does not say."""
     found = {k: o for k, o in cls.options().items() if o.annotation in (Path, Path | None)}
     return {k: o.default for k, o in found.items()}
 
 
-def deformer_of_link(function: Callable[..., Any]) -> type[AbstractDeformer]:
-    """The deformers that a link is for."""
+def classes_of_link(function: Callable[..., Any]) -> tuple[type, ...]:
+    """What a link is for: some deformers, and modelers perhaps."""
     first, *_ = inspect.signature(function, eval_str=True).parameters.values()
-    return first.annotation
+    return typing.get_args(first.annotation) or (first.annotation,)
 
 
 def of_link(name: str, function: Callable[..., Any]) -> type[BaseModel]:
-    """What a case file may say to make a link, for a deformer given already."""
+    """What a case file may say to make a link, for what it turns given already."""
     parameters = dict(inspect.signature(function).parameters)
     parameters.pop(next(iter(parameters)))
     if any(p.kind is p.VAR_KEYWORD for p in parameters.values()):
@@ -112,7 +120,7 @@ def problems(error: ValidationError, where: str, given: Any) -> list[str]:
     for problem in error.errors():
         key, value = _found(given, problem["loc"])
         if problem["type"] == "missing" and isinstance(problem["loc"][-1], str):
-            key, said = problem["loc"], "it must be there"
+            key, said = _own(problem["loc"]), "it must be there"
         elif problem["type"] == "missing":
             said = "too few entries"
         elif problem["type"] == "extra_forbidden":
@@ -120,7 +128,7 @@ def problems(error: ValidationError, where: str, given: Any) -> list[str]:
         else:
             said = problem["msg"].lower()
         expected.setdefault(key, []).append(said)
-        is_absent = problem["type"] == "missing" and key == problem["loc"]
+        is_absent = problem["type"] == "missing" and key == _own(problem["loc"])
         held[key] = "" if is_absent else _SHORT.repr(value)
     return [
         ".".join(map(str, filter(lambda part: part != "", (where, *key))))
@@ -130,10 +138,14 @@ def problems(error: ValidationError, where: str, given: Any) -> list[str]:
     ]
 
 
+def _own(place: tuple[str | int, ...]) -> tuple[str | int, ...]:
+    return tuple(part for part in place if part not in (DEFORMS, MAKES))
+
+
 def _found(given: Any, place: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], Any]:
     """The part of a place that the given tables really have (models add names of types)."""
     key: list[str | int] = []
-    for part in place:
+    for part in _own(place):
         try:
             given = given[part]
         except (KeyError, IndexError, TypeError):

@@ -2,9 +2,9 @@
 
 import tomllib
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 
 from .. import registry
 from ..errors import CaseError, FileError
@@ -64,17 +64,38 @@ class LinkTable(BaseModel):
     )
 
 
+class ConstructionTable(BaseModel):
+    """One modeler; further keys are its own options."""
+
+    model_config = ConfigDict(extra="allow")
+    modeler: str
+    name: str = Field("", description="what reports call the stage")
+    to: str = Field(min_length=1, description="name of the geometry that it makes")
+    of: list[str] = Field(default_factory=list, description="geometries that it is made from")
+    link: list[LinkTable] = Field(default_factory=list)
+
+
 class StageTable(BaseModel):
     """One deformer; further keys are its own options."""
 
     model_config = ConfigDict(extra="allow")
     deformer: str
-    name: str = ""
+    name: str = Field("", description="what reports call the stage")
     on: str = Field("", description="the geometry it acts on; not needed where there is one")
     carried: bool = Field(
         False, description="bound at rest and carried along by the stages before, as a child box"
     )
     link: list[LinkTable] = Field(default_factory=list)
+
+
+def _kind(table: Any) -> str:
+    return options.MAKES if isinstance(table, dict) and "modeler" in table else options.DEFORMS
+
+
+AnyStage = Annotated[
+    Annotated[StageTable, Tag(options.DEFORMS)] | Annotated[ConstructionTable, Tag(options.MAKES)],
+    Discriminator(_kind),
+]
 
 
 class OutputTable(Table):
@@ -88,9 +109,9 @@ class CaseTable(Table):
     """A whole case file."""
 
     moldline: Literal[1] = Field(description="version of this format")
-    geometry: dict[str, GeometryTable] = Field(min_length=1)
+    geometry: dict[str, GeometryTable] = Field(default_factory=dict)
     variable: dict[str, VariableTable] = Field(default_factory=dict)
-    stage: list[StageTable] = Field(default_factory=list)
+    stage: list[AnyStage] = Field(default_factory=list)
     measure: dict[str, MeasureTable] = Field(default_factory=dict)
     rider: dict[str, RiderTable] = Field(default_factory=dict)
     output: OutputTable = OutputTable()
@@ -138,10 +159,14 @@ def json_schema() -> dict[str, Any]:
     measures = {
         name: options.of_class(name, registry.measure(name)) for name in registry.measures()
     }
+    modelers = {
+        name: options.of_class(name, registry.modeler(name)) for name in registry.modelers()
+    }
     links = {name: options.of_link(name, function) for name, function in LINKS.items()}
     hidden = DeformerTable.model_json_schema()
     for name, table, key, models in (
         ("StageTable", definitions["StageTable"], "deformer", deformers),
+        ("ConstructionTable", definitions["ConstructionTable"], "modeler", modelers),
         ("DeformerTable", hidden, "deformer", deformers),
         ("MeasureTable", definitions["MeasureTable"], "measure", measures),
         ("LinkTable", definitions["LinkTable"], "link", links),

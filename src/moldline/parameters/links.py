@@ -17,12 +17,15 @@ from ..deformers.lattice import Lattice
 from ..deformers.named import AbstractNamed
 from ..deformers.net import AXES, AbstractControlNet
 from ..errors import ParameterError
+from ..modelers.base import AbstractModeler
 from .link import Across, Link
 
 AxisName = Literal["x", "y", "z"]
 
 
-def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -> Link:
+def controls(
+    deformer: AbstractDeformer | AbstractModeler, numbers: Sequence[int] | None = None
+) -> Link:
     """One variable number for each of a deformer's controls, or for those given by number."""
     chosen = range(deformer.size) if numbers is None else numbers
     _check_numbers(chosen, deformer.size, "controls")
@@ -32,7 +35,7 @@ def controls(deformer: AbstractDeformer, numbers: Sequence[int] | None = None) -
 
 
 def named(
-    deformer: AbstractNamed,
+    deformer: AbstractNamed | AbstractModeler,
     parameter: str | list[str],
     index: Sequence[int] | None = None,
     absolute: bool = False,

@@ -121,8 +121,22 @@ class Proof:
 
 
 def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
-    """Search a deformation for folds, at samples; a small fold between them is not seen."""
-    points = np.asarray(pipeline.geometry.points)
+    """Search a deformation for folds, at samples; a small fold between them is not seen.
+
+    What the result is made from is searched too, each by its own stages.
+    """
+    parts = [_own_folding(part, values) for part in _parts(pipeline)]
+    worst = min(parts, key=lambda part: part.smallest)
+    return Folding(
+        worst.smallest,
+        worst.place,
+        min(part.at_points for part in parts),
+        sum(part.samples for part in parts),
+    )
+
+
+def _own_folding(pipeline: Pipeline, values: Values | None) -> Folding:
+    points = _start(pipeline, values)
     steps = pipeline.steps(values)
     nets = [step.deformer for step in steps]
     samples = [net.samples(MOST_SAMPLES) for net in nets if isinstance(net, AbstractControlNet)]
@@ -147,12 +161,19 @@ def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
 
 def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
     """Stages that tear the mesh where it leaves their boxes."""
+    return [tear for part in _parts(pipeline) for tear in _own_tears(part, values)]
+
+
+def _own_tears(pipeline: Pipeline, values: Values | None) -> list[Tear]:
+    steps = pipeline.steps(values)
+    if not steps:
+        return []
     edges = joined_points(pipeline.geometry)
     found = []
-    rest = np.asarray(pipeline.geometry.points)
+    rest = _start(pipeline, values)
     present = rest
     size = float(np.ptp(rest, axis=0).max())
-    for step in pipeline.steps(values):
+    for step in steps:
         if isinstance(step.deformer, AbstractControlNet):
             bound = rest if step.stage.carried else present
             places, gaps = step.deformer.tears(bound, edges, step.controls)
@@ -166,11 +187,16 @@ def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
 
 
 def embedded(pipeline: Pipeline) -> list[Embedded]:
-    """How well control volumes found the geometry's points."""
+    """How well control volumes found the points that they are bound to."""
+    return [one for part in _parts(pipeline) for one in _own_embedded(part)]
+
+
+def _own_embedded(pipeline: Pipeline) -> list[Embedded]:
     points = pipeline.geometry.points
     found = []
-    for number, stage in enumerate(pipeline.own_stages):
-        if isinstance(stage.deformer, ControlVolume) and (number == 0 or stage.carried):
+    for number in pipeline.branches[pipeline.result].bindings:
+        stage = pipeline.own_stages[number]
+        if isinstance(stage.deformer, ControlVolume):
             places = stage.deformer.embedded(points)
             inside = places.volume >= 0
             found.append(
@@ -196,11 +222,13 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
         for name, variable in pipeline.variables.items()
     }
     methods = {
-        stage.deformer.method(pipeline.geometry.points, stage.controls(full))
-        for stage in pipeline.own_stages
+        stage.deformer.method(part.geometry.points, stage.controls(full))
+        for part in _parts(pipeline)
+        for stage in part.own_stages
         if isinstance(stage.deformer, AbstractNumpyDeformer)
     }
     accuracy = 1e-7 if "central differences" in methods else 0.0
+    pipeline = pipeline.at(full)
     weights = rng.normal(size=pipeline.geometry.points.shape)
     pushed = float(np.vdot(weights, np.asarray(pipeline.pushforward(full, along))))
     pulled = pipeline.pullback(full, weights)
@@ -211,6 +239,17 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
         abs(pushed - dotted) / scale,
         ", ".join(sorted(methods)) or "exact",
     )
+
+
+def _parts(pipeline: Pipeline) -> list[Pipeline]:
+    """A pipeline for each geometry that the result is made from, and itself."""
+    return [pipeline.of(name) for name in pipeline.feeding]
+
+
+def _start(pipeline: Pipeline, values: Values | None) -> np.ndarray:
+    """Points of the result before its stages."""
+    rides = pipeline.result != pipeline.leading
+    return np.asarray(pipeline.geometry.points if rides else pipeline.source(values))
 
 
 def _place(point: Array) -> tuple[float, float, float]:
@@ -226,13 +265,14 @@ def inverted_cells(pipeline: Pipeline, values: Values | None = None) -> np.ndarr
 
 
 def turned_faces(pipeline: Pipeline, values: Values | None = None) -> np.ndarray:
-    """Faces of a surface whose normals the deformation turns by more than 90 degrees."""
+    """Faces of a surface whose normals its stages turn by more than 90 degrees."""
     if not isinstance(pipeline.geometry, Surface):
         return np.empty(0, int)
-    faces = np.asarray(pipeline.geometry.faces)
+    pipeline = pipeline.at(values)
+    faces = np.asarray(pipeline.geometry.faces)  # type: ignore[union-attr]
     before, after = (
         _normals(np.asarray(points), faces)
-        for points in (pipeline.geometry.points, pipeline.points(values))
+        for points in (_start(pipeline, values), pipeline.points(values))
     )
     return np.flatnonzero(np.einsum("ij,ij->i", before, after) < 0)
 

@@ -93,16 +93,23 @@ class Holding:
 
 
 def holding(pipeline: Pipeline, values: Values | None = None) -> list[Holding]:
-    """How well the pilots of each stage are met."""
+    """How well the pilots of each stage are met, also on what the result is made from."""
+    names = pipeline.feeding
+    return [held for name in names for held in _own_holding(pipeline.of(name), values)]
+
+
+def _own_holding(pipeline: Pipeline, values: Values | None) -> list[Holding]:
     full = pipeline.values(values)
-    rest = np.asarray(pipeline.geometries[pipeline.result.split("/")[0]].points)
+    rest = np.asarray(pipeline.source(full))
+    is_fixed = pipeline.branches[pipeline.leading].is_fixed
     steps = pipeline.steps(full)
     present, found = rest, []
     for number, step in enumerate(steps):
         pilots, stage = step.stage.deformer, step.stage
         is_first = number == 0 or steps[number - 1].stage is not stage
         if isinstance(pilots, Pilots) and is_first:
-            shape = None if number == 0 or stage.carried else present
+            is_bound = is_fixed and (number == 0 or stage.carried)
+            shape = None if is_bound else rest if stage.carried else present
             report = pilots.report(np.asarray(stage.controls(full)), shape)
             count = sum(measure.size for measure in pilots.measures)
             found.append(Holding(stage.name, count, pilots.net.size, report))

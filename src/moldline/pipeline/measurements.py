@@ -1,25 +1,32 @@
 """Measures of what a pipeline gives: readouts, and constraints for an optimiser."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .._types import Array
+from .._types import Array, Points
 from ..errors import ParameterError
 from ..measures.base import AbstractMeasure, Constraint
+from ..mesh import Geometry
 from .pipeline import Pipeline, Values
 
 BEYOND = 1e-9
 """A number is beyond a bound by more than this part of it, or of 1 where that is larger."""
 
 
+Maker: TypeAlias = Callable[[Geometry], AbstractMeasure | Constraint]
+
+
 class Measurements:
     """Named measures of a pipeline's geometry, with their bounds and exact derivatives.
+
+    Where a union is made anew, its measures must be too: give functions of the geometry that
+    make them.
 
     Attributes
     ----------
@@ -29,16 +36,22 @@ class Measurements:
         Measures with their bounds, by name; those given without have none.
     """
 
-    def __init__(self, pipeline: Pipeline, measures: Mapping[str, AbstractMeasure | Constraint]):
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        measures: Mapping[str, AbstractMeasure | Constraint | Maker],
+    ):
         self.pipeline = pipeline
+        self._given = dict(measures)
         self.constraints = {
-            name: one if isinstance(one, Constraint) else Constraint(one)
-            for name, one in measures.items()
+            name: _constraint(one, pipeline.geometry) for name, one in measures.items()
         }
 
     def __call__(self, values: Values | None = None) -> dict[str, np.ndarray]:
         """The numbers of each measure at some values of the variables."""
-        found = self._valued(self.pipeline.values(values))
+        full = self.pipeline.values(values)
+        here = self._at(full)
+        found = here._numbers(here.pipeline.points(full)) if here._is_made else here._valued(full)
         return {name: np.asarray(found[name]) for name in self.constraints}
 
     def jacobian(
@@ -46,10 +59,7 @@ class Measurements:
     ) -> dict[str, dict[str, Float[np.ndarray, "k v"]]]:
         """Derivative of each measure's numbers by each variable's, in the variable's unit."""
         full = self.pipeline.values(values)
-        return {
-            name: {key: np.asarray(rows) for key, rows in self._sloped[name](full).items()}
-            for name in self.constraints
-        }
+        return {name: self._slopes(name, full) for name in self.constraints}
 
     def beyond(self, numbers: Mapping[str, Array]) -> dict[str, np.ndarray]:
         """By how much numbers are beyond their bounds, for those measures where some are."""
@@ -98,16 +108,48 @@ class Measurements:
         self, name: str, x: np.ndarray, variables: Sequence[str] | None
     ) -> Float[np.ndarray, "k v"]:
         values = self.split(x, variables)
-        slopes = self._sloped[name](self.pipeline.values(values))
-        return np.concatenate([np.asarray(slopes[key]) for key in values], axis=1)
+        slopes = self._slopes(name, self.pipeline.values(values))
+        return np.concatenate([slopes[key] for key in values], axis=1)
+
+    def _at(self, full: dict[str, Array]) -> "Measurements":
+        """These measures, or where the geometry is made anew, those of the new one."""
+        pipeline = self.pipeline.at(full)
+        if pipeline is self.pipeline:
+            return self
+        if not self._recent or self._recent[0].pipeline is not pipeline:
+            fixed = [name for name, one in self._given.items() if not _is_maker(one)]
+            if fixed:
+                raise ParameterError(
+                    f"measure {fixed[0]!r} was made for a surface that is made anew at these "
+                    "values, with other points: give a function of the surface that makes it"
+                )
+            self._recent[:] = [Measurements(pipeline, self._given)]
+        return self._recent[0]
+
+    def _slopes(self, name: str, full: dict[str, Array]) -> dict[str, np.ndarray]:
+        here = self._at(full)
+        if not here._is_made:
+            return {key: np.asarray(rows) for key, rows in here._sloped[name](full).items()}
+        measure = here.constraints[name].measure
+        pull = jax.vjp(measure, here.pipeline.points(full))[1]
+        rows = [here.pipeline.pullback(full, *pull(row)) for row in jnp.eye(measure.size)]
+        return {key: np.stack([row[key] for row in rows]) for key in full}
+
+    @property
+    def _is_made(self) -> bool:
+        """Whether the geometry is made from others, and so cannot be compiled once for all."""
+        return len(self.pipeline.feeding) > 1
+
+    @cached_property
+    def _recent(self) -> list["Measurements"]:
+        return []
+
+    def _numbers(self, points: Points) -> dict[str, Array]:
+        return {name: one.measure(points) for name, one in self.constraints.items()}
 
     @cached_property
     def _valued(self) -> Any:
-        def numbers(full: dict[str, Array]) -> dict[str, Array]:
-            points = self.pipeline.points(full)
-            return {name: one.measure(points) for name, one in self.constraints.items()}
-
-        return jax.jit(numbers)
+        return jax.jit(lambda full: self._numbers(self.pipeline.points(full)))
 
     @cached_property
     def _sloped(self) -> dict[str, Any]:
@@ -119,3 +161,12 @@ class Measurements:
             name: jax.jit(lambda full, m=one.measure: slopes(m, full))
             for name, one in self.constraints.items()
         }
+
+
+def _is_maker(one: AbstractMeasure | Constraint | Maker) -> bool:
+    return not isinstance(one, AbstractMeasure | Constraint)
+
+
+def _constraint(one: AbstractMeasure | Constraint | Maker, geometry: Geometry) -> Constraint:
+    made = one(geometry) if _is_maker(one) else one  # type: ignore[operator, arg-type]
+    return made if isinstance(made, Constraint) else Constraint(made)  # type: ignore[arg-type]

@@ -1,6 +1,7 @@
-"""A pipeline: named geometries and the stages that deform them, one after the other."""
+"""A pipeline: named geometries and the stages that make and deform them, one after the other."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import logging
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -11,145 +12,165 @@ import numpy as np
 from jaxtyping import Float
 from tqdm import tqdm
 
-from .._types import Array, Points
-from ..deformers.base import AbstractBinding
-from ..deformers.chain import plain
+from .._types import Array, Points, is_concrete
 from ..errors import ParameterError
 from ..mesh import Geometry
 from ..mesh.cloud import Cloud
 from ..parameters.variable import Variable
+from .assembly import Assembly, check_name, check_rides, feeding, taken
+from .branch import Branch
+from .construction import Construction
 from .stage import Stage, Step
 
 Values: TypeAlias = Mapping[str, Any]
 
+States: TypeAlias = dict[str, Array]
+"""Points of geometries behind their stages, by name."""
+
+log = logging.getLogger("moldline.pipeline")
+
 
 class Pipeline(eqx.Module):
-    """Variable values in, a deformed geometry and its exact derivatives out.
+    """Variable values in, a geometry and its exact derivatives out.
+
+    What is made from other geometries, such as the union of a wing and a body, keeps its
+    connectivity while that is right. Where it is not, values that can be looked at get it made
+    anew (`at` gives the pipeline with it; the log says so); under `jax.jit` and `jax.grad` it is
+    an error.
 
     Attributes
     ----------
-    geometries
-        What the stages act on, by name. One whose name holds a slash, such as "wing/flow", rides
-        on the geometry before the slash: it moves as that one does.
+    branches
+        Every geometry by name with the stages on it. One whose name holds a slash, such as
+        "wing/flow", rides on the geometry before the slash: it moves as that one does.
     stages
         In order; each acts on what the ones before it give.
     variables
         All variables of the stages, by name.
     result
         Which geometry the pipeline gives back.
-    bindings
-        For each geometry the first stage on it and the carried ones, tied to its points, by their
-        place among its stages.
     """
 
-    geometries: dict[str, Geometry]
-    stages: tuple[Stage, ...]
+    branches: dict[str, Branch]
+    stages: tuple[Stage | Construction, ...]
     variables: dict[str, Variable] = eqx.field(static=True)
     result: str = eqx.field(static=True)
-    bindings: dict[str, dict[int, AbstractBinding]]
 
     def __init__(
         self,
-        geometries: Geometry | Mapping[str, Geometry],
-        stages: Sequence[Stage],
+        geometries: Geometry | Mapping[str, Geometry] | Assembly,
+        stages: Sequence[Stage | Construction],
         result: str | None = None,
     ):
-        named = geometries if isinstance(geometries, Mapping) else {"geometry": geometries}
-        bases = [name for name in named if "/" not in name]
-        self.geometries = dict(named)
-        self.stages = tuple(_placed(stages, bases))
-        self.variables = _collected(self.stages)
-        self.result = result or bases[-1]
-        _check_name(self.result, self.geometries)
-        self.bindings = {
-            name: {
-                number: stage.bind(name, geometry.points)
-                for number, stage in enumerate(self._on(name))
-                if number == 0 or stage.carried
-            }
-            for name, geometry in self.geometries.items()
-        }
+        """Geometries by name, or the one that there is, or an assembly of them and some stages.
+
+        The result is what the last stage makes, else the last of the geometries, unless named.
+        """
+        assembly = _assembly(geometries)
+        for stage in stages:
+            assembly.add(stage)
+        if not assembly.names:
+            raise ParameterError("a pipeline needs a geometry, or a stage that makes one")
+        self.branches = assembly.branches()
+        self.stages = tuple(assembly.stages)
+        self.variables = dict(assembly.variables)
+        self.result = result or assembly.names[-1]
+        check_name(self.result, self.branches)
 
     def __call__(self, values: Values | None = None) -> Geometry:
-        """The deformed geometry; a variable that `values` does not name keeps its own value."""
-        return self.geometry.moved(self.points(values))
+        """The geometry; a variable that `values` does not name keeps its own value."""
+        here, states = self._at(self.values(values))
+        return here.geometry.moved(states[self.result])
+
+    @property
+    def geometries(self) -> dict[str, Geometry]:
+        """Every geometry before the stages on it, at the variables' own values."""
+        return {name: branch.geometry for name, branch in self.branches.items()}
 
     @property
     def geometry(self) -> Geometry:
-        """The geometry that the pipeline gives back, at rest."""
-        return self.geometries[self.result]
+        """The same of the geometry that the pipeline gives back."""
+        return self.branches[self.result].geometry
 
     @property
     def own_stages(self) -> tuple[Stage, ...]:
         """The stages that act on the geometry that the pipeline gives back."""
-        return self._on(self.result)
+        return self.branches[self.result].stages
+
+    @property
+    def feeding(self) -> list[str]:
+        """Names of the geometries that the result is made from, in order, and its own."""
+        return feeding(self.branches, self.result)
+
+    def of(self, name: str) -> "Pipeline":
+        """The pipeline that gives back another of its geometries."""
+        check_name(name, self.branches)
+        return self._with(self.branches, name)
+
+    def at(self, values: Values | None = None) -> "Pipeline":
+        """Itself, or where connectivity is not right for the values, with that made anew."""
+        return self._at(self.values(values))[0]
 
     def points(self, values: Values | None = None) -> Points:
-        """The deformed points alone; differentiable by JAX in the values."""
-        full = self.values(values)
-        base = self.result.split("/")[0]
-        needed = dict.fromkeys([base, self.result] if self._settles else [self.result])
-        state = {name: self.geometries[name].points for name in needed}
-        for number, stage in enumerate(self._on(self.result)):
-            controls = stage.controls(full)
-            bound = number == 0 or stage.carried
-            moving = stage.deformer
-            if stage.settles and not bound:
-                moving, controls = stage.deformer.settle(state[base], controls)
-            for name in needed:
-                rest = self.geometries[name].points
-                if not bound:
-                    moved = moving.follow(state[name], controls)
-                else:
-                    moved = self.bindings[name][number](controls)
-                    if number > 0:
-                        moved = state[name] + (moved - rest)
-                state[name] = stage.held(rest, moved)
-        return state[self.result]
+        """The points alone; differentiable by JAX in the values."""
+        return self._at(self.values(values))[1][self.result]
+
+    def source(self, values: Values | None = None) -> Points:
+        """Points of the result's geometry before the stages on it."""
+        here, states = self._at(self.values(values))
+        own = here.branches[here.leading]
+        return own.source(self.values(values), [states[name] for name in own.of])
 
     def steps(self, values: Values | None = None) -> list[Step]:
-        """What moves points, stage by stage; pilots behind another stage see the present shape."""
-        full = self.values(values)
-        present = self.geometries[self.result.split("/")[0]].points
-        rest, found = present, []
-        for number, stage in enumerate(self._on(self.result)):
-            moving, controls = stage.deformer, stage.controls(full)
-            if stage.settles and number > 0 and not stage.carried:
-                moving, controls = moving.settle(present, controls)
-            parts = plain(moving, controls)
-            if stage.carried and len(parts) > 1:  # each part would be carried by itself
-                parts = [(moving, controls)]
-            own = [Step(stage, *part) for part in parts]
-            found += own
-            if self._settles:
-                for step in own:
-                    present = step.after(rest, present)
-        return found
+        """What moves the result's points, stage by stage."""
+        return self.branches[self.result].steps(self.values(values), self.source(values))
+
+    @property
+    def leading(self) -> str:
+        """The geometry that the result is, or rides on."""
+        return self.result.split("/")[0]
 
     def pushforward(self, values: Values | None, directions: Values) -> Points:
         """Derivative of the points along a change of the values, shape (n, 3)."""
         full = self.values(values)
         for name in directions:
-            _check_name(name, full)
+            check_name(name, full)
         change = {name: self._direction(name, directions.get(name)) for name in full}
-        return self._push(full, change)
+        here, _ = self._at(full)
+        states: States = {}
+        moves: States = {}
+        for branch in here._feeders():
+            made, motions = ([known[name] for name in branch.of] for known in (states, moves))
+            states[branch.name], moves[branch.name] = branch.push(full, change, made, motions)
+        return moves[self.result]
 
     def pullback(self, values: Values | None, cotangent: Points) -> dict[str, Float[Array, "v"]]:
         """Gradient of a scalar by the values, from its derivative by the points, (n, 3)."""
+        full = self.values(values)
+        here, states = self._at(full)
         array = jnp.asarray(cotangent)
-        if array.shape != self.geometry.points.shape:
+        if array.shape != here.geometry.points.shape:
             raise ParameterError(
-                f"the cotangent must have the shape {self.geometry.points.shape}, got {array.shape}"
+                f"the cotangent must have the shape {here.geometry.points.shape}, got {array.shape}"
             )
-        return self._pull(self.values(values), array)
+        gradient: dict[str, Array] = {name: jnp.zeros_like(value) for name, value in full.items()}
+        waiting: States = {self.result: array}
+        for branch in reversed(list(here._feeders())):
+            made = [states[name] for name in branch.of]
+            by_values, by_made = branch.pull(full, made, waiting.pop(branch.name))
+            gradient = {name: gradient[name] + by_values[name] for name in full}
+            for name, part in zip(branch.of, by_made, strict=True):
+                waiting[name] = waiting[name] + part if name in waiting else part
+        return gradient
 
     def sensitivity(self, values: Values | None, name: str) -> Float[np.ndarray, "n 3 v"]:
         """Derivative of every point by every number of one variable, exact."""
-        _check_name(name, self.variables)
+        check_name(name, self.variables)
         full = self.values(values)
         size = self.variables[name].size
-        _, push = jax.linearize(lambda v: self.points({**full, name: v}), full[name])
-        columns = np.empty((len(self.geometry.points), 3, size))
+        here, states = self._at(full)
+        push = here._linear(full, name)
+        columns = np.empty((len(states[self.result]), 3, size))
         for i in tqdm(range(size), desc=f"sensitivity to {name}", delay=2, leave=False):
             columns[..., i] = push(jnp.zeros(size).at[i].set(1.0))
         return columns
@@ -165,36 +186,96 @@ class Pipeline(eqx.Module):
 
         What comes back shares the variables; called, it gives the other geometry deformed.
         """
-        base = on or self.result.split("/")[0]
-        _check_name(base, self.geometries)
-        rider = Cloud(points) if isinstance(points, jax.Array | np.ndarray) else points
+        base = on or self.leading
+        check_name(base, self.branches)
+        leader = self.branches[base]
         key = f"{base}/{name}"
-        return Pipeline({base: self.geometries[base], key: rider}, self._on(base), key)
+        check_rides(key, leader)
+        rider = Cloud(points) if isinstance(points, jax.Array | np.ndarray) else points
+        branch = Branch(key, rider, leader.stages, leader=leader)
+        return self._with({**self.branches, key: branch}, key)
 
     def values(self, values: Values | None = None) -> dict[str, Float[Array, "v"]]:
         """A checked value for every variable, its own where none is given."""
         given = values or {}
         for name in given:
-            _check_name(name, self.variables)
+            check_name(name, self.variables)
         return {
             name: jnp.asarray(variable.checked(jnp.asarray(given.get(name, variable.value), float)))
             for name, variable in self.variables.items()
         }
 
-    @cached_property
-    def _push(self) -> Callable[..., Any]:
-        return jax.jit(lambda values, change: jax.jvp(self.points, (values,), (change,))[1])
+    def _feeders(self) -> Iterator[Branch]:
+        return (self.branches[name] for name in self.feeding)
+
+    def _at(self, full: dict[str, Array]) -> tuple["Pipeline", States]:
+        """The pipeline whose connectivity is right for the values, and all points there."""
+        recent = self._recent
+        for known in (self, *recent[-1:]):
+            states = known._states(full)
+            if states is not None:
+                return known, states
+        branches, states = dict(self.branches), {}
+        for branch in self._feeders():
+            made = [states[name] for name in branch.of]
+            if branch.making is not None and not branch.making.holds(*made):
+                assert branch.construction is not None
+                inputs = [taken(branches[name], states[name]) for name in branch.of]
+                branch = branch.remade(branch.construction.bind(inputs))
+                branches[branch.name] = branch
+                log.info("%r is made anew: its parts cross in other places", branch.name)
+            states[branch.name] = branch.points(full, made)
+        recent[:] = [self._with(branches, self.result)]
+        return recent[0], states
+
+    def _states(self, full: dict[str, Array]) -> States | None:
+        """All points, or None where values can be looked at and connectivity is not right."""
+        states: States = {}
+        for branch in self._feeders():
+            made = [states[name] for name in branch.of]
+            is_known = bool(made) and is_concrete(*made)
+            if is_known and branch.making is not None and not branch.making.holds(*made):
+                return None
+            states[branch.name] = branch.points(full, made)
+        return states
+
+    def _linear(self, full: dict[str, Array], name: str) -> Callable[[Array], Array]:
+        """The derivative by one variable, ready for many directions."""
+        states: States = {}
+        pushes: dict[str, Callable[..., Array]] = {}
+        for branch in self._feeders():
+            states[branch.name], pushes[branch.name] = jax.linearize(
+                lambda v, *made, own=branch: own.points({**full, name: v}, made),
+                full[name],
+                *(states[other] for other in branch.of),
+            )
+
+        def push(direction: Array) -> Array:
+            moves: States = {}
+            for branch in self._feeders():
+                moves[branch.name] = pushes[branch.name](
+                    direction, *(moves[other] for other in branch.of)
+                )
+            return moves[self.result]
+
+        return push
 
     @cached_property
-    def _pull(self) -> Callable[..., Any]:
-        return jax.jit(lambda values, cotangent: jax.vjp(self.points, values)[1](cotangent)[0])
+    def _recent(self) -> list["Pipeline"]:
+        """The pipeline that was made anew last, for the values near those it was made for."""
+        return []
 
-    def _on(self, name: str) -> tuple[Stage, ...]:
-        return tuple(stage for stage in self.stages if stage.on == name.split("/")[0])
-
-    @property
-    def _settles(self) -> bool:
-        return any(stage.settles for stage in self._on(self.result))
+    def _with(self, branches: Mapping[str, Branch], result: str) -> "Pipeline":
+        """The same stages with other branches; what those have compiled they keep."""
+        other = object.__new__(Pipeline)
+        for name, value in (
+            ("branches", dict(branches)),
+            ("stages", self.stages),
+            ("variables", self.variables),
+            ("result", result),
+        ):
+            object.__setattr__(other, name, value)
+        return other
 
     def _direction(self, name: str, direction: Any) -> Array:
         variable = self.variables[name]
@@ -202,27 +283,8 @@ class Pipeline(eqx.Module):
         return jnp.asarray(variable.checked(given))
 
 
-def _placed(stages: Sequence[Stage], bases: list[str]) -> Iterable[Stage]:
-    """Stages with the name of their geometry filled in."""
-    for stage in stages:
-        if not stage.on and len(bases) > 1:
-            raise ParameterError(
-                f"stage {stage.name!r} must say on which geometry it acts: {', '.join(bases)}"
-            )
-        on = stage.on or bases[0]
-        _check_name(on, bases)
-        yield Stage(stage.deformer, stage.links, on, stage.name, stage.carried)
-
-
-def _collected(stages: Iterable[Stage]) -> dict[str, Variable]:
-    found: dict[str, Variable] = {}
-    for stage in stages:
-        for variable in stage.links:
-            if found.setdefault(variable.name, variable) != variable:
-                raise ParameterError(f"two different variables are named {variable.name!r}")
-    return found
-
-
-def _check_name(name: str, known: Iterable[str]) -> None:
-    if name not in known:
-        raise ParameterError(f"nothing named {name!r}; there is: {', '.join(known)}")
+def _assembly(geometries: Geometry | Mapping[str, Geometry] | Assembly) -> Assembly:
+    if isinstance(geometries, Assembly):
+        return geometries
+    named = geometries if isinstance(geometries, Mapping) else {"geometry": geometries}
+    return Assembly(named)

@@ -53,19 +53,7 @@ class Stage(eqx.Module):
         self.carried = carried
 
     def __check_init__(self) -> None:
-        for variable, link in self.links.items():
-            rows = link.matrix.shape[0]
-            if rows != self.deformer.size:
-                raise ParameterError(
-                    f"stage {self.name!r}: the link of variable {variable.name!r} is for {rows} "
-                    f"controls, the deformer has {self.deformer.size}; was it made for another?"
-                )
-            if link.size != variable.size:
-                raise ParameterError(
-                    f"stage {self.name!r}: the link of variable {variable.name!r} takes "
-                    f"{link.size} numbers, the variable has {variable.size}; make its size "
-                    f"{link.size}"
-                )
+        check_links(self.name, self.links, self.deformer.size)
 
     @property
     def across(self) -> Across | None:
@@ -80,10 +68,7 @@ class Stage(eqx.Module):
 
     def controls(self, values: Mapping[str, Float[Array, "v"]]) -> Vector:
         """Controls from the variables' values, given in the designer's units."""
-        total = jnp.asarray(self.deformer.neutral)
-        for variable, link in self.links.items():
-            total = total + link(values[variable.name] * variable.factor)
-        return total
+        return turned(self.deformer.neutral, self.links, values)
 
     def bind(self, geometry: str, points: Points) -> AbstractBinding:
         """The deformer tied to the points of a geometry, whose name an error gives."""
@@ -123,3 +108,29 @@ class Step(NamedTuple):
         if self.stage.carried:
             return present + (self.deformer.follow(rest, self.controls) - rest)
         return self.deformer.follow(present, self.controls)
+
+
+def check_links(name: str, links: Mapping[Variable, Link], size: int) -> None:
+    """Refuse links of a stage that were made for another number of controls or of variables."""
+    for variable, link in links.items():
+        rows = link.matrix.shape[0]
+        if rows != size:
+            raise ParameterError(
+                f"stage {name!r}: the link of variable {variable.name!r} is for {rows} controls, "
+                f"the stage has {size}; was it made for another?"
+            )
+        if link.size != variable.size:
+            raise ParameterError(
+                f"stage {name!r}: the link of variable {variable.name!r} takes {link.size} "
+                f"numbers, the variable has {variable.size}; make its size {link.size}"
+            )
+
+
+def turned(
+    neutral: Vector, links: Mapping[Variable, Link], values: Mapping[str, Float[Array, "v"]]
+) -> Vector:
+    """Controls from the variables' values, given in the designer's units."""
+    total = jnp.asarray(neutral)
+    for variable, link in links.items():
+        total = total + link(values[variable.name] * variable.factor)
+    return total

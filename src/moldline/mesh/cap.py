@@ -66,7 +66,7 @@ def capped(
     loops = [loop[::-1] for loop, off in zip(found, offsets, strict=True) if off <= near]
     if not loops:
         raise GeometryError(_none_found(plane, at, near, offsets))
-    faces = _between(points[:, [(axis + 1) % 3, (axis + 2) % 3]], loops)
+    faces = spanned(points[:, [(axis + 1) % 3, (axis + 2) % 3]], loops)
     names = surface.components if tag in surface.components else (*surface.components, tag)
     cap = Surface(points, faces)
     result = Surface(
@@ -105,8 +105,8 @@ def uncapped(surface: Surface, tag: str = "symmetry") -> Surface:
     )
 
 
-def _between(flat: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:
-    """Triangles that run along the loops, from whichever side of the plane that is seen."""
+def spanned(flat: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:
+    """Triangles between loops in a plane that run along them, whichever side they are seen from."""
     sizes = np.array([loop_area(flat[loop]) for loop in loops])
     is_clockwise = sizes[np.argmax(np.abs(sizes))] < 0
     return triangulated(flat[:, ::-1] if is_clockwise else flat, loops)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from .._types import Faces, Points
+from ..numerics import box_tree
 from . import topology
 
 MOST = 100_000
@@ -67,8 +68,8 @@ def _tree(corners: np.ndarray, leaf: int) -> tuple[np.ndarray, ...]:
     The boxes are those of a complete binary tree, root 1, children 2v and 2v + 1; with them comes
     the last triangle of each.
     """
-    order = _along_curve(corners.mean(axis=1))
-    leaves = 1 << max(-(-len(order) // leaf) - 1, 0).bit_length()
+    order = box_tree.along_curve(corners.mean(axis=1))
+    leaves = box_tree.leaves(len(order), leaf)
     low = np.full((leaves * leaf, 3), np.inf)
     high = -low
     low[: len(order)], high[: len(order)] = corners[order].min(axis=1), corners[order].max(axis=1)
@@ -86,26 +87,6 @@ def _tree(corners: np.ndarray, leaf: int) -> tuple[np.ndarray, ...]:
         np.concatenate([nothing, *highs]),
         np.concatenate([[-1], *lasts]),
     )
-
-
-def _along_curve(places: np.ndarray) -> np.ndarray:
-    """Order of points along Morton's curve, 2²¹ steps a side."""
-    low = places.min(axis=0)
-    size = (places - low).max() or 1.0
-    code = np.zeros(len(places), np.uint64)
-    steps = ((places - low) / size * (2**21 - 1)).astype(np.uint64)
-    for axis in range(3):
-        bits = steps[:, axis]
-        for shift, mask in (
-            (32, 0x1F00000000FFFF),
-            (16, 0x1F0000FF0000FF),
-            (8, 0x100F00F00F00F00F),
-            (4, 0x10C30C30C30C30C3),
-            (2, 0x1249249249249249),
-        ):
-            bits = (bits | bits << np.uint64(shift)) & np.uint64(mask)
-        code |= bits << np.uint64(axis)
-    return np.argsort(code, kind="stable")
 
 
 def _places(one: np.ndarray, other: np.ndarray) -> np.ndarray:

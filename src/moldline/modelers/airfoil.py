@@ -1,7 +1,8 @@
 """What every airfoil is: two sides at fixed chordwise stations, and a section made of them."""
 
 import abc
-from typing import Literal, TypeAlias
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,7 +13,7 @@ from typing_extensions import override
 from .._types import Array, ArrayLike, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Section
-from .base import AbstractShape
+from .base import AbstractModeler, AbstractShape
 from .spacing import Spacing, stations
 
 Edge: TypeAlias = Literal["sharp", "blunt"]
@@ -65,6 +66,12 @@ class AbstractAirfoil(AbstractShape):
     @abc.abstractmethod
     def name(self) -> str:
         """What the section is called."""
+
+    @classmethod
+    @override
+    def build(cls, folder: Path, **options: Any) -> "AbstractModeler":
+        """Make one from a case file's options, whose lists stay lists."""
+        return cls(**options)
 
     @override
     def __call__(self, parameters: Vector) -> Points:

@@ -95,3 +95,48 @@ def reaches(name: str, given: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
             f"got {numbers.tolist()}"
         )
     return numbers, np.eye(count)[:, 1:]
+
+
+def choices(**given: tuple[Any, Any]) -> None:
+    """Refuse what is none of the words that an option takes."""
+    for name, (value, allowed) in given.items():
+        words = getattr(allowed, "__args__", allowed)
+        if value not in words:
+            raise ParameterError(
+                f"{name} must be one of {', '.join(map(str, words))}; got {value!r}"
+            )
+
+
+def station_count(each: Mapping[str, Any], panels: Mapping[str, Any], what: str) -> int:
+    """Stations: as many as the lists say, or two.
+
+    What speaks of each station has one entry for it, what speaks of panels one less.
+    """
+    said = {name: len(given) for name, given in each.items() if _is_list(given)}
+    said |= {name: len(given) + 1 for name, given in panels.items() if np.ndim(given)}
+    if len(set(said.values())) > 1:
+        told = ", ".join(f"{name} for {count}" for name, count in said.items())
+        raise ParameterError(
+            f"lists must speak of the same number of stations, got {told}; "
+            f"{', '.join(each)} have one entry for each station, {', '.join(panels)} one less"
+        )
+    count = next(iter(said.values()), 2)
+    if count < 2:
+        raise ParameterError(f"a {what} needs two or more stations, its lists have {count}")
+    return count
+
+
+def placed(origin: Any, is_halved: bool, what: str) -> np.ndarray:
+    """A place (x, y, z), without y where a mirror plane at y = 0 is to stay."""
+    place = np.array(origin, float)
+    if place.shape != (3,):
+        raise ParameterError(f"origin is a place (x, y, z), got {origin}")
+    if not is_halved:
+        return place
+    if place[1] != 0:
+        raise ParameterError(f"{what} begins at y = 0, got origin = {origin}")
+    return place[[0, 2]]
+
+
+def _is_list(given: Any) -> bool:
+    return isinstance(given, list | tuple)

@@ -16,7 +16,15 @@ from .airfoil import AbstractAirfoil
 from .airfoils import airfoil as airfoil_of
 from .base import AbstractShape
 from .loft import Lofting, loft_weights, row_places
-from .quantities import Quantities, positive, reaches, spread
+from .quantities import (
+    Quantities,
+    choices,
+    placed,
+    positive,
+    reaches,
+    spread,
+    station_count,
+)
 from .spacing import Spacing, stations
 from .wing_layout import Root, Tip, WingLayout, cap_edges
 
@@ -120,14 +128,15 @@ class Wing(AbstractShape):
         name: str = "wing",
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
-        _choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
+        choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
         panels: dict[str, Any] = {"sweep": sweep, "dihedral": dihedral}
         each: dict[str, Any] = {"chord": chord, "twist": twist, "thickness": thickness}
         each["camber"] = camber
-        count = _count(span, each, panels, airfoil)
+        lists = each | ({"airfoil": airfoil} if isinstance(airfoil, list | tuple) else {})
+        count = station_count(lists, {"span": span} | panels, "wing")
         self._sections(airfoil, count, section_parameters, chordwise, spacing)
         reach, self.reach = reaches("span", span, count)
-        self._numbers(reach, each, panels, _origin(origin, sides))
+        self._numbers(reach, each, panels, placed(origin, sides == 2, "a wing with two sides"))
         self._rows(reach, spanwise, clustering, loft, tip)
         self.layout = self._laid(base_points, tip, root, sides)
 
@@ -306,36 +315,6 @@ class Wing(AbstractShape):
         return Surface(points, faces, tags, tuple(names[used].tolist()))
 
 
-def _choices(**given: tuple[Any, Any]) -> None:
-    """Refuse what is none of the words that an option takes."""
-    for name, (value, allowed) in given.items():
-        words = getattr(allowed, "__args__", allowed)
-        if value not in words:
-            raise ParameterError(
-                f"{name} must be one of {', '.join(map(str, words))}; got {value!r}"
-            )
-
-
-def _count(span: Any, stations: Mapping[str, Any], panels: Mapping[str, Any], airfoil: Any) -> int:
-    """Stations: as many as the lists say, or two."""
-    said = {"span": np.size(span) + 1} if np.ndim(span) else {}
-    said |= {name: np.size(given) for name, given in stations.items() if np.ndim(given)}
-    said |= {name: np.size(given) + 1 for name, given in panels.items() if np.ndim(given)}
-    if isinstance(airfoil, list | tuple):
-        said["airfoil"] = len(airfoil)
-    if len(set(said.values())) > 1:
-        told = ", ".join(f"{name} for {count}" for name, count in said.items())
-        raise ParameterError(
-            f"lists must speak of the same number of stations, got {told}; chord, twist, "
-            "thickness, camber and airfoil have one entry for each station, span, sweep and "
-            "dihedral one less"
-        )
-    count = next(iter(said.values()), 2)
-    if count < 2:
-        raise ParameterError(f"a wing needs two or more stations, its lists have {count}")
-    return count
-
-
 def _leaning(name: str, angles: np.ndarray) -> np.ndarray:
     if not np.all(np.abs(angles) <= STEEPEST):
         raise ParameterError(
@@ -343,18 +322,6 @@ def _leaning(name: str, angles: np.ndarray) -> np.ndarray:
             "they degrees? A wing that stands up is one with along = 'z'"
         )
     return angles
-
-
-def _origin(given: Any, sides: int) -> np.ndarray:
-    """Where the root's leading edge is; without y where the mirror is to stay in place."""
-    origin = np.array(given, float)
-    if origin.shape != (3,):
-        raise ParameterError(f"origin is a place (x, y, z), got {given}")
-    if sides == 1:
-        return origin
-    if origin[1] != 0:
-        raise ParameterError(f"a wing with two sides begins at y = 0, got origin = {given}")
-    return origin[[0, 2]]
 
 
 def _wanted(airfoil: AbstractAirfoil, wanted: bool | list[str]) -> tuple[str, ...]:

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 COMMANDS = (
-    "parameterise", "deform", "sensitivity", "measure", "check", "info", "convert", "plot",
-    "schema",
+    "parameterise", "build", "deform", "sensitivity", "measure", "check", "info", "convert",
+    "plot", "schema",
 )  # fmt: skip
 
 DESCRIPTION = """\

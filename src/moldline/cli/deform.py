@@ -56,7 +56,9 @@ def run(given: argparse.Namespace) -> int:
     shape = pipeline(chosen)
     seconds = time.perf_counter() - start
     write(target, shape, units=case.units(given.rider))
-    rest = np.asarray(pipeline.geometry.points)
+    here = pipeline.at(chosen)
+    is_joined = len(here.feeding) > 1
+    rest = np.asarray(here.source(chosen) if is_joined else pipeline.geometry.points)
     moved = float(np.linalg.norm(np.asarray(shape.points) - rest, axis=1).max())
     torn, held = examine.tears(pipeline, chosen), holding(pipeline, chosen)
     report = {

@@ -12,11 +12,15 @@ from ..deformers.foreign import AbstractNumpyDeformer
 from ..deformers.net import AbstractControlNet
 from ..mesh import Surface, VolumeMesh, quality
 from ..mesh.joined import joined_points
+from ..numerics import taylor
 from ..numerics.taylor import Remainder, remainder
 from .pipeline import Pipeline, Values
 
 MOST_SAMPLES = 200_000
 """Places in the box of a lattice or control volume that are searched for folds."""
+
+SHORTEST = 1e-8
+"""Part of a typical change below which a union is not looked for that stays as it is."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:
 
     What the result is made from is searched too, each by its own stages.
     """
-    parts = [_own_folding(part, values) for part in _parts(pipeline)]
+    parts = [_own_folding(part, values) for part in _parts(pipeline, values)]
     worst = min(parts, key=lambda part: part.smallest)
     return Folding(
         worst.smallest,
@@ -161,7 +165,7 @@ def _own_folding(pipeline: Pipeline, values: Values | None) -> Folding:
 
 def tears(pipeline: Pipeline, values: Values | None = None) -> list[Tear]:
     """Stages that tear the mesh where it leaves their boxes."""
-    return [tear for part in _parts(pipeline) for tear in _own_tears(part, values)]
+    return [tear for part in _parts(pipeline, values) for tear in _own_tears(part, values)]
 
 
 def _own_tears(pipeline: Pipeline, values: Values | None) -> list[Tear]:
@@ -188,7 +192,7 @@ def _own_tears(pipeline: Pipeline, values: Values | None) -> list[Tear]:
 
 def embedded(pipeline: Pipeline) -> list[Embedded]:
     """How well control volumes found the points that they are bound to."""
-    return [one for part in _parts(pipeline) for one in _own_embedded(part)]
+    return [one for part in _parts(pipeline, None) for one in _own_embedded(part)]
 
 
 def _own_embedded(pipeline: Pipeline) -> list[Embedded]:
@@ -223,12 +227,13 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
     }
     methods = {
         stage.deformer.method(part.geometry.points, stage.controls(full))
-        for part in _parts(pipeline)
+        for part in _parts(pipeline, full)
         for stage in part.own_stages
         if isinstance(stage.deformer, AbstractNumpyDeformer)
     }
     accuracy = 1e-7 if "central differences" in methods else 0.0
     pipeline = pipeline.at(full)
+    along = _within(pipeline, full, along)
     weights = rng.normal(size=pipeline.geometry.points.shape)
     pushed = float(np.vdot(weights, np.asarray(pipeline.pushforward(full, along))))
     pulled = pipeline.pullback(full, weights)
@@ -241,9 +246,23 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
     )
 
 
-def _parts(pipeline: Pipeline) -> list[Pipeline]:
-    """A pipeline for each geometry that the result is made from, and itself."""
-    return [pipeline.of(name) for name in pipeline.feeding]
+def _parts(pipeline: Pipeline, values: Values | None) -> list[Pipeline]:
+    """A pipeline for each geometry that the result is made from, and for itself."""
+    here = pipeline.at(values)
+    return [here.of(name) for name in here.feeding]
+
+
+def _within(pipeline: Pipeline, full: Values, along: Values) -> dict[str, Array]:
+    """A direction, shortened until the connectivity is right on all the way."""
+    length = 1.0
+    while length > SHORTEST:
+        steps = [
+            {name: full[name] + h * length * along[name] for name in full} for h in taylor.STEPS
+        ]
+        if all(pipeline.holds(there) for there in steps):
+            break
+        length /= 4
+    return {name: length * along[name] for name in along}
 
 
 def _start(pipeline: Pipeline, values: Values | None) -> np.ndarray:

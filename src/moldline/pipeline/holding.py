@@ -94,8 +94,8 @@ class Holding:
 
 def holding(pipeline: Pipeline, values: Values | None = None) -> list[Holding]:
     """How well the pilots of each stage are met, also on what the result is made from."""
-    names = pipeline.feeding
-    return [held for name in names for held in _own_holding(pipeline.of(name), values)]
+    here = pipeline.at(values)
+    return [held for name in here.feeding for held in _own_holding(here.of(name), values)]
 
 
 def _own_holding(pipeline: Pipeline, values: Values | None) -> list[Holding]:

@@ -111,6 +111,10 @@ class Pipeline(eqx.Module):
         """Itself, or where connectivity is not right for the values, with that made anew."""
         return self._at(self.values(values))[0]
 
+    def holds(self, values: Values | None = None) -> bool:
+        """Whether the connectivity is right for the values."""
+        return self._states(self.values(values)) is not None
+
     def points(self, values: Values | None = None) -> Points:
         """The points alone; differentiable by JAX in the values."""
         return self._at(self.values(values))[1][self.result]

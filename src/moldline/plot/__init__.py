@@ -3,6 +3,7 @@
 from ..mesh.slices import cut
 from .faults import of_faults
 from .figure import save
+from .flowchart import of_pipeline
 from .nets import Net, draw_net
 from .pictures import of_cuts, of_deformation, of_geometry, of_sensitivity
 from .reflections import of_reflections
@@ -22,6 +23,7 @@ __all__ = [
     "of_deformation",
     "of_faults",
     "of_geometry",
+    "of_pipeline",
     "of_reflections",
     "of_sensitivity",
     "save",

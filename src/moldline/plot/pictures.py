@@ -10,7 +10,7 @@ from .._types import Points
 from ..deformers.net import AbstractControlNet
 from ..deformers.pilots import Pilots
 from ..errors import ParameterError
-from ..mesh import Cloud, Geometry, Section, VolumeMesh
+from ..mesh import Cloud, Geometry, Section, Surface, VolumeMesh
 from ..mesh.joined import joined_points
 from ..pipeline.pipeline import Pipeline, Values
 from ..pipeline.stage import Step
@@ -43,7 +43,12 @@ def of_geometry(geometry: Geometry, view: View | str = "iso", title: str = "") -
 def of_deformation(
     pipeline: Pipeline, values: Values | None = None, view: View | str = "iso", title: str = ""
 ) -> Figure:
-    """A pipeline's geometry before and after, with its control points; of others the after."""
+    """A pipeline's geometry before and after, with its control points.
+
+    Of what is no surface, and of what is made from other geometries, only the after is drawn.
+    """
+    if len(pipeline.feeding) > 1:  # its triangles may be others at other values
+        return _among_points(pipeline(values), nets(pipeline, values), view, title)
     rest, moved = pipeline.geometry.points, pipeline.points(values)
     drawn = nets(pipeline, values)
     if isinstance(pipeline.geometry, Section):
@@ -72,6 +77,7 @@ def of_sensitivity(
     name, index = _numbered(pipeline, number)
     variable = pipeline.variables[name]
     direction = {name: np.eye(variable.size)[index]}
+    pipeline = pipeline.at(values)
     motion = np.asarray(pipeline.pushforward(values, direction))
     axis = int(np.abs(motion).max(axis=0).argmax())
     unit = f" per {variable.unit}" if variable.unit else ""
@@ -90,8 +96,10 @@ def of_sensitivity(
 
 def of_cuts(pipeline: Pipeline, values: Values | None, stations: Sequence[float]) -> Figure:
     """Sections at several y, before (dashed) and after."""
-    rest, moved = pipeline.geometry.points, np.asarray(pipeline.points(values))
-    return section_picture(rest, moved, _faces(pipeline), stations)
+    here, is_joined = pipeline.at(values), len(pipeline.feeding) > 1
+    rest = here.source(values) if is_joined else here.geometry.points
+    moved = np.asarray(here.points(values))
+    return section_picture(rest, moved, _faces(here), stations)
 
 
 def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
@@ -103,7 +111,15 @@ def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:
 
 
 def nets(pipeline: Pipeline, values: Values | None = None) -> list[Net]:
-    """Control points of a pipeline's stages, and the places that pilots hold."""
+    """Control points of a pipeline's stages, and the places that pilots hold.
+
+    Those on geometries that the result is made from come first.
+    """
+    here = pipeline.at(values)
+    return [net for name in here.feeding for net in _own_nets(here.of(name), values)]
+
+
+def _own_nets(pipeline: Pipeline, values: Values | None) -> list[Net]:
     found = []
     steps = pipeline.steps(values)
     for number, step in enumerate(steps):
@@ -116,7 +132,7 @@ def nets(pipeline: Pipeline, values: Values | None = None) -> list[Net]:
         is_last = number + 1 == len(steps) or steps[number + 1].stage is not step.stage
         pilots = _pilots(step)
         if pilots is not None and is_last:
-            base = pipeline.geometries[pipeline.result.split("/")[0]].points
+            base = pipeline.source(values)
             moved = _after(steps[: number + 1], base)
             before, after = (np.asarray(pilots.marks(shape)) for shape in (base, moved))
             found.append(Net(np.empty((0, 2), int), before, after))
@@ -156,15 +172,18 @@ def _moving(motion: np.ndarray) -> np.ndarray:
 
 
 def _among_points(geometry: Geometry, drawn: list[Net], view: View | str, title: str) -> Figure:
-    """A mesh or a cloud with control points in it, of which it may reach far beyond."""
+    """A geometry with control points in it, of which a mesh may reach far beyond."""
     figure = of_geometry(geometry, view, title)
     (axes,) = figure.axes
     shown = View.of("top" if getattr(geometry, "dimension", 3) == 2 else view)
     for net in drawn:
         draw_net(axes, net.lines, net.rest, net.moved, view=shown, is_hidden=net.is_hidden)
     if drawn:
-        corners = np.concatenate([places for net in drawn for places in (net.rest, net.moved)])
-        low, high = (f(shown.project(corners)[:, :2], axis=0) for f in (np.min, np.max))
+        corners = [places for net in drawn for places in (net.rest, net.moved)]
+        if isinstance(geometry, Surface):
+            corners.append(geometry.points)
+        flat = shown.project(np.concatenate(corners))[:, :2]
+        low, high = flat.min(axis=0), flat.max(axis=0)
         room = 0.15 * (high - low).max()
         axes.set_aspect("equal", adjustable="box")
         axes.set_xlim(low[0] - room, high[0] + room)

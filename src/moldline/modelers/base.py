@@ -106,9 +106,10 @@ class Shaped(AbstractMaking):
 
     @override
     def __call__(self, parameters: Vector, *points: Array) -> Array:
-        return _shaped(self.shape, parameters)
+        return shaped(self.shape, parameters)
 
 
 @eqx.filter_jit
-def _shaped(shape: AbstractShape, parameters: Vector) -> Points:
+def shaped(shape: AbstractShape, parameters: Vector) -> Points:
+    """What the shape's definition says, compiled."""
     return shape(parameters)

@@ -12,12 +12,13 @@ from typing_extensions import override
 from .._types import Array, Points, Vector
 from ..errors import GeometryError, ParameterError
 from ..mesh import Surface
-from .base import AbstractShape
+from .base import AbstractShape, shaped
 from .body_loft import body_weights
 from .loft import Lofting, row_places
 from .quantities import (
     Quantities,
     choices,
+    even_ring,
     placed,
     positive,
     reaches,
@@ -83,8 +84,6 @@ class Body(AbstractShape):
         name: str = "body",
     ):
         choices(nose=(nose, End), tail=(tail, End), loft=(loft, Lofting))
-        if around < 6 or around % 2:
-            raise ParameterError(f"around must be an even number, 6 at least; got {around}")
         sizes = _sizes(radius, width, height)
         each = {**sizes, "lift": lift, "exponent": exponent}
         if lower_exponent is not None:
@@ -101,7 +100,7 @@ class Body(AbstractShape):
         place = placed(origin, half, "half a body")
         self.quantities = Quantities({"length": reach} | own | {"origin": place})
         self.name = name
-        self._rows(loft, (nose, tail), along, clustering, around // 2, not half)
+        self._rows(loft, (nose, tail), along, clustering, even_ring(around), not half)
 
     def _rows(
         self,
@@ -194,7 +193,7 @@ class Body(AbstractShape):
     @property
     @override
     def geometry(self) -> Surface:
-        points = np.asarray(self(self.values))
+        points = np.asarray(shaped(self, self.values))
         return Surface(points, self.layout.faces(points), components=(self.name,))
 
 

@@ -97,6 +97,14 @@ def reaches(name: str, given: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
     return numbers, np.eye(count)[:, 1:]
 
 
+def radians(is_degrees: bool, **angles: Any) -> dict[str, Any]:
+    """Angles in radians, which they are unless given in degrees; lists stay lists."""
+    if not is_degrees:
+        return angles
+    turned = {name: np.radians(given) for name, given in angles.items()}
+    return {name: given.tolist() for name, given in turned.items()}
+
+
 def choices(**given: tuple[Any, Any]) -> None:
     """Refuse what is none of the words that an option takes."""
     for name, (value, allowed) in given.items():
@@ -105,6 +113,22 @@ def choices(**given: tuple[Any, Any]) -> None:
             raise ParameterError(
                 f"{name} must be one of {', '.join(map(str, words))}; got {value!r}"
             )
+
+
+def base_points_of(given: int, is_blunt: bool) -> int:
+    """Points inside a base, checked."""
+    if given < 0 or (given and not is_blunt):
+        raise ParameterError(
+            f"base_points = {given}: it must be 0 or more, and 0 where the trailing edge is sharp"
+        )
+    return given
+
+
+def even_ring(around: int) -> int:
+    """Edges in half a ring of so many."""
+    if around < 6 or around % 2:
+        raise ParameterError(f"around must be an even number, 6 at least; got {around}")
+    return around // 2
 
 
 def station_count(each: Mapping[str, Any], panels: Mapping[str, Any], what: str) -> int:

@@ -12,15 +12,17 @@ from typing_extensions import override
 from .._types import Array, Points, Vector
 from ..errors import ParameterError
 from ..mesh import Surface
-from .airfoil import AbstractAirfoil
 from .airfoils import airfoil as airfoil_of
-from .base import AbstractShape
+from .base import AbstractShape, shaped
 from .loft import Lofting, loft_weights, row_places
+from .profile import Profile, scaled
 from .quantities import (
     Quantities,
+    base_points_of,
     choices,
     placed,
     positive,
+    radians,
     reaches,
     spread,
     station_count,
@@ -59,16 +61,8 @@ class Wing(AbstractShape):
     ----------
     quantities
         The parameters.
-    airfoils
-        Of each station; those alike are the same object.
-    own
-        Each airfoil's own values.
-    drawn
-        Both sides of each station's airfoil by these values, for the chord 1.
-    thick
-        The greatest thickness of each, of the chord.
-    stations
-        Chordwise, from the nose to the trailing edge.
+    profiles
+        The airfoil of each station; those alike are the same object.
     reach
         Takes `span` to the distance of each station from the root.
     weights
@@ -79,22 +73,15 @@ class Wing(AbstractShape):
         What is left of each row's thickness where the tip is closed.
     layout
         The order of the points.
-    exposed
-        Which parameters of each airfoil are the wing's.
     """
 
     quantities: Quantities
-    airfoils: tuple[AbstractAirfoil, ...]
-    own: tuple[np.ndarray, ...]
-    drawn: np.ndarray
-    thick: np.ndarray
-    stations: np.ndarray
+    profiles: tuple[Profile, ...]
     reach: np.ndarray
     weights: np.ndarray
     slope: np.ndarray
     thinning: np.ndarray
     layout: WingLayout
-    exposed: tuple[tuple[str, ...], ...] = eqx.field(static=True)
     sweep_at: float = eqx.field(static=True)
     twist_at: float = eqx.field(static=True)
     along: str = eqx.field(static=True)
@@ -113,6 +100,7 @@ class Wing(AbstractShape):
         airfoil: Any = "naca 0012",
         section_parameters: bool | list[str] = False,
         origin: Sequence[float] = (0.0, 0.0, 0.0),
+        degrees: bool = False,
         sweep_at: float = 0.0,
         twist_at: float = 0.25,
         loft: Lofting = "linear",
@@ -129,8 +117,9 @@ class Wing(AbstractShape):
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
         choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
-        panels: dict[str, Any] = {"sweep": sweep, "dihedral": dihedral}
-        each: dict[str, Any] = {"chord": chord, "twist": twist, "thickness": thickness}
+        angles = radians(degrees, sweep=sweep, dihedral=dihedral, twist=twist)
+        panels: dict[str, Any] = {key: angles[key] for key in ("sweep", "dihedral")}
+        each: dict[str, Any] = {"chord": chord, "twist": angles["twist"], "thickness": thickness}
         each["camber"] = camber
         lists = each | ({"airfoil": airfoil} if isinstance(airfoil, list | tuple) else {})
         count = station_count(lists, {"span": span} | panels, "wing")
@@ -144,9 +133,9 @@ class Wing(AbstractShape):
         self, reach: np.ndarray, each: dict[str, Any], panels: dict[str, Any], origin: np.ndarray
     ) -> None:
         """Name the parameters."""
-        count = len(self.thick)
+        count, thick = len(self.profiles), [profile.thick for profile in self.profiles]
         if each["thickness"] is None:
-            each["thickness"] = self.thick[:1] if np.ptp(self.thick) == 0 else self.thick
+            each["thickness"] = thick if np.ptp(thick) else thick[0]
         own = {key: spread(key, given, count, "station") for key, given in each.items()}
         for key, given in panels.items():
             own[key] = _leaning(key, spread(key, given, count - 1, "panel"))
@@ -154,36 +143,27 @@ class Wing(AbstractShape):
         positive("thickness", own["thickness"], "of the chord")
         names = ("chord", "sweep", "dihedral", "twist", "thickness", "camber")
         shape = {"span": reach} | {key: own[key] for key in names} | {"origin": origin}
-        self.quantities = Quantities(shape | self._exposed())
+        sections = {
+            f"section {s} {name}": numbers
+            for s, profile in enumerate(self.profiles)
+            for name, numbers in profile.numbers.items()
+        }
+        self.quantities = Quantities(shape | sections)
 
     def _sections(
         self, airfoil: Any, count: int, wanted: bool | list[str], chordwise: int, spacing: Any
     ) -> None:
-        """Draw the airfoils by their own values."""
+        """Draw the airfoils, each once."""
         each = airfoil if isinstance(airfoil, list | tuple) else [airfoil] * count
-        made: dict[int, AbstractAirfoil] = {id(a): airfoil_of(a) for a in each}
-        self.airfoils = tuple(made[id(a)] for a in each)
-        blunt = {a.is_blunt for a in self.airfoils}
-        if len(blunt) > 1:
+        made = {id(a): airfoil_of(a) for a in each}
+        if len({a.is_blunt for a in made.values()}) > 1:
             raise ParameterError(
                 "the airfoils of a wing must all be blunt or all be sharp at the trailing edge, "
-                f"got {', '.join(a.name for a in self.airfoils)}; say trailing_edge for each"
+                f"got {', '.join(a.name for a in made.values())}; say trailing_edge for each"
             )
-        self.stations = stations(self.airfoils[0], chordwise, spacing)
-        self.own = tuple(np.asarray(a.values, float) for a in self.airfoils)
-        seen = {id(a): np.asarray(a.sides(a.values, self.stations)) for a in self.airfoils}
-        self.drawn = np.stack([seen[id(a)] for a in self.airfoils])
-        thick = {id(a): _thickest(a) for a in self.airfoils}
-        self.thick = np.array([thick[id(a)] for a in self.airfoils])
-        self.exposed = tuple(_wanted(a, wanted) for a in self.airfoils)
-
-    def _exposed(self) -> dict[str, np.ndarray]:
-        """The airfoils' parameters that are the wing's, by its names for them."""
-        return {
-            f"section {s} {name}": own[a.parameters[name]]
-            for s, (a, own) in enumerate(zip(self.airfoils, self.own, strict=True))
-            for name in self.exposed[s]
-        }
+        at = stations(made[id(each[0])], chordwise, spacing)
+        drawn = {key: Profile(a, at, wanted) for key, a in made.items()}
+        self.profiles = tuple(drawn[id(a)] for a in each)
 
     def _rows(
         self, span: np.ndarray, spanwise: int, clustering: float, loft: str, tip: str
@@ -197,31 +177,19 @@ class Wing(AbstractShape):
         self.thinning = np.sqrt(1 - beyond**2) if tip == "closed" else np.ones(len(rows))
 
     def _laid(self, base_points: int, tip: str, root: str, sides: int) -> WingLayout:
-        blunt = self.airfoils[0].is_blunt
-        if base_points < 0 or (base_points and not blunt):
-            raise ParameterError(
-                f"base_points = {base_points}: it must be 0 or more, and 0 where the trailing edge "
-                "is sharp"
-            )
-        ends = {"tip": (-1, tip), "root": (0, "flat")}
-        edges = {k: self._edges(s, how) for k, (s, how) in ends.items()}
+        blunt = self.profiles[0].airfoil.is_blunt
+        outlines = np.asarray(self._outlines(self.quantities.parted(self.values)))
         return WingLayout(
             rows=len(self.weights),
-            side=len(self.stations),
-            base=base_points,
+            side=outlines.shape[2],
+            base=base_points_of(base_points, blunt),
             is_blunt=blunt,
             tip=tip,
             root="open" if sides == 2 else root,
-            tip_edges=() if tip == "closed" else edges["tip"],
-            root_edges=edges["root"],
+            tip_edges=() if tip == "closed" else cap_edges(outlines[-1], tip, blunt),
+            root_edges=cap_edges(outlines[0], "flat", blunt),
             is_whole=sides == 2,
         )
-
-    def _edges(self, station: int, kind: str) -> tuple[int, ...]:
-        """Edges across a cap at a station, by the section with the thickness asked for."""
-        outlines = np.asarray(self._outlines(self.quantities.parted(self.values)))
-        upper, lower = outlines[station]
-        return cap_edges(upper, lower, kind, self.airfoils[0].is_blunt)
 
     @classmethod
     @override
@@ -287,27 +255,17 @@ class Wing(AbstractShape):
 
     def _outlines(self, given: Mapping[str, Array]) -> Array:
         """Both sides of each station's section for the chord 1, shape (s, 2, c, 2)."""
-        if any(self.exposed):
-            outlines = jnp.stack([self._outline(s, given) for s in range(len(self.airfoils))])
-        else:
-            outlines = jnp.asarray(self.drawn)
-        middle, half = (outlines[:, 0] + outlines[:, 1]) / 2, (outlines[:, 0] - outlines[:, 1]) / 2
-        count = len(outlines)
-        camber = jnp.broadcast_to(given["camber"], (count,))[:, None]
-        middle = middle.at[..., 1].multiply(camber)
-        half = half * (jnp.broadcast_to(given["thickness"], (count,)) / self.thick)[:, None, None]
-        return jnp.stack([middle + half, middle - half], axis=1)
-
-    def _outline(self, station: int, given: Mapping[str, Array]) -> Array:
-        foil, own = self.airfoils[station], jnp.asarray(self.own[station])
-        for name in self.exposed[station]:
-            own = own.at[foil.parameters[name]].set(given[f"section {station} {name}"])
-        return foil.sides(own, self.stations)
+        sides = []
+        for s, profile in enumerate(self.profiles):
+            sides.append(profile.sides({k: given[f"section {s} {k}"] for k in profile.exposed}))
+        thick = jnp.stack([jnp.asarray(profile.thick) for profile in self.profiles])
+        camber = jnp.broadcast_to(given["camber"], thick.shape)
+        return scaled(jnp.stack(sides), given["thickness"] / thick, camber)
 
     @property
     @override
     def geometry(self) -> Surface:
-        points = np.asarray(self(self.values))
+        points = np.asarray(shaped(self, self.values))
         faces, tags = self.layout.faces(points)
         faces = faces[:, ::-1] if self.along == "-y" else faces
         names = np.array([self.name, f"{self.name} tip", f"{self.name} root"])
@@ -322,25 +280,3 @@ def _leaning(name: str, angles: np.ndarray) -> np.ndarray:
             "they degrees? A wing that stands up is one with along = 'z'"
         )
     return angles
-
-
-def _wanted(airfoil: AbstractAirfoil, wanted: bool | list[str]) -> tuple[str, ...]:
-    """Names of an airfoil's parameters that are to be the wing's."""
-    if isinstance(wanted, bool):
-        return tuple(airfoil.parameters) if wanted else ()
-    for name in wanted:
-        if name not in airfoil.parameters:
-            raise ParameterError(
-                f"{airfoil.name} has no parameter {name!r}; section_parameters may be: "
-                f"{', '.join(airfoil.parameters)}"
-            )
-    return tuple(wanted)
-
-
-def _thickest(airfoil: AbstractAirfoil) -> float:
-    """The greatest distance of the two sides, between close stations by a parabola."""
-    upper, lower = np.asarray(airfoil.sides(airfoil.values, stations(None, 2001)))
-    gap = np.linalg.norm(upper - lower, axis=1)
-    k = int(np.clip(np.argmax(gap), 1, len(gap) - 2))
-    before, most, after = gap[k - 1 : k + 2]
-    return float(most + (after - before) ** 2 / (8 * (2 * most - before - after)))

@@ -169,11 +169,12 @@ class WingLayout(eqx.Module):
         return is_shared
 
 
-def cap_edges(upper: np.ndarray, lower: np.ndarray, kind: str, is_blunt: bool) -> tuple[int, ...]:
-    """How many edges lead across a cap at each station of a section, shape (side, 2).
+def cap_edges(outline: np.ndarray, kind: str, is_blunt: bool) -> tuple[int, ...]:
+    """How many edges lead across a cap at each station of a section, shape (2, side, 2).
 
     As many as are about as long as those along the sides there.
     """
+    upper, lower = outline
     height = np.linalg.norm(upper - lower, axis=1) * (np.pi / 2 if kind == "round" else 1.0)
     steps = np.linalg.norm(np.diff(upper, axis=0), axis=1)
     width = np.convolve(steps, [0.5, 0.5])

@@ -1,6 +1,6 @@
 """What a union takes: surfaces with a name, checked and closed, half models by an extension."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -193,6 +193,11 @@ def check(solid: Solid, plane: Plane | None, looks_for_crossings: bool) -> None:
             f"near {_place(crossing.places[0])}; a union needs to know inside from outside: part "
             'them, make the piece a component of its own, or say crossings="allow"'
         )
+
+
+def extent(clouds: Iterable[Array]) -> float:
+    """Diagonal of the box around all points [m]."""
+    return float(np.linalg.norm(np.ptp(np.concatenate([np.asarray(c) for c in clouds]), axis=0)))
 
 
 def _place(point: Array) -> str:

@@ -1,24 +1,26 @@
 """The wetted surface: overlapping closed components united into one watertight surface."""
 
 from collections.abc import Sequence
-from itertools import chain
 
 import numpy as np
 from typing_extensions import override
 
-from .._types import Array, is_concrete
+from .._types import is_concrete
 from ..errors import GeometryError, ParameterError
 from ..mesh import Geometry, Surface
+from .assembly import assembled
 from .base import AbstractModeler
-from .provenance import Provenance, joined
-from .solids import Plane, Solid, check, solid, symmetry_plane
+from .provenance import joined
+from .solids import Plane, Solid, check, extent, solid, symmetry_plane
 from .touching import apart, check_coplanar, groups
-from .wetted_report import ALTITUDE, altitudes, reported
 from .wetted_state import WettedState
-from .wetting import Wetting, followed, recipe
+from .wetting import Wetting
 
 DEPTH = 0.05
 """How far half models are extended through their plane, by the extent; each by another multiple."""
+
+CLEAN = 1e-4
+"""How far off the plane of its face cleaning takes a corner at most, by the extent."""
 
 
 class Union(AbstractModeler):
@@ -39,6 +41,13 @@ class Union(AbstractModeler):
         another out; "refuse" refuses them.
     crossings
         "refuse" refuses components whose own faces run through each other, "allow" does not look.
+    slivers
+        "clean" takes slivers away that the cut made, by merging points into neighbours and turning
+        edges; what is left follows the components by the same formulas. "keep" leaves the cut as
+        it is, which alone has the exact volume.
+    tolerance
+        How far cleaning may take a corner off the plane of its face [m]; by default `CLEAN` of the
+        extent.
 
     Notes
     -----
@@ -48,12 +57,15 @@ class Union(AbstractModeler):
     symmetry: str | None = None
     apart: str = "refuse"
     crossings: str = "refuse"
+    slivers: str = "keep"
+    tolerance: float | None = None
 
     def __check_init__(self) -> None:
         choices = {
             "symmetry": (None, "x", "y", "z"),
             "apart": ("refuse", "allow"),
             "crossings": ("refuse", "allow"),
+            "slivers": ("keep", "clean"),
         }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
@@ -61,6 +73,8 @@ class Union(AbstractModeler):
                     f"a union's {name} is one of {', '.join(map(repr, allowed))}, got "
                     f"{getattr(self, name)!r}"
                 )
+        if self.tolerance is not None and not 0 < self.tolerance < np.inf:
+            raise ParameterError(f"a union's tolerance is a length [m], got {self.tolerance}")
 
     @property
     @override
@@ -80,7 +94,22 @@ class Union(AbstractModeler):
         check_coplanar(solids, state)
         notes = self._notes(solids, state)
         made = joined(solids)
-        return _bound(surfaces, called, solids, plane, state, made, notes)
+        cleans = self.slivers == "clean"
+        geometry, report, follow = assembled(
+            surfaces,
+            called,
+            solids,
+            plane,
+            made,
+            self._tolerance(solids) if cleans else None,
+            notes,
+        )
+        return Wetting(geometry, report, follow, state)
+
+    def _tolerance(self, solids: list[Solid]) -> float:
+        return (
+            CLEAN * extent(s.points for s in solids) if self.tolerance is None else self.tolerance
+        )
 
     def _plane(self, surfaces: list[Surface], names: list[str]) -> Plane | None:
         if self.symmetry is None:
@@ -90,8 +119,7 @@ class Union(AbstractModeler):
     def _solids(
         self, surfaces: list[Surface], names: list[str], plane: Plane | None
     ) -> list[Solid]:
-        every = np.concatenate([np.asarray(s.points) for s in surfaces])
-        depth = DEPTH * float(np.linalg.norm(np.ptp(every, axis=0)))
+        depth = DEPTH * extent(s.points for s in surfaces)
         solids = []
         for k, (surface, name) in enumerate(zip(surfaces, names, strict=True)):
             solids.append(solid(surface, name, plane, depth * (1 + k)))
@@ -127,69 +155,3 @@ def _surfaces(geometries: Sequence[Geometry]) -> list[Surface]:
     if len(geometries) < 2:
         raise GeometryError(f"a union takes two surfaces or more, got {len(geometries)}")
     return [g for g in geometries if isinstance(g, Surface)]
-
-
-def _bound(
-    surfaces: list[Surface],
-    names: list[str],
-    solids: list[Solid],
-    plane: Plane | None,
-    state: WettedState,
-    made: Provenance,
-    notes: tuple[str, ...],
-) -> Wetting:
-    points = tuple(np.asarray(s.points, float) for s in surfaces)
-    offset = np.zeros(3)
-    if plane is not None:
-        offset[plane.axis] = -plane.side
-    follow = recipe(points, made, offset)
-    components, tags = _components(surfaces, names, solids, made)
-    geometry = Surface(
-        np.asarray(followed(follow, points)[0]),
-        made.faces,
-        tags,
-        components,
-        face_data=_face_data(surfaces, made),
-    )
-    given = sum(int(np.sum(altitudes(s.points, s.faces) < ALTITUDE)) for s in solids)
-    counts = len(made.kept), len(made.edges), len(made.triples)
-    axis = None if plane is None else plane.axis
-    report = reported(geometry, counts, made.residual, given, axis, notes)
-    return Wetting(geometry, report, follow, state)
-
-
-def _components(
-    surfaces: list[Surface], names: list[str], solids: list[Solid], made: Provenance
-) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names of the components, and the number of each face's.
-
-    Those of the inputs if they all differ, else with the input's name before; an input that has
-    but one, called "1" as where nothing was said, gives its own name. A component that lay wholly
-    in the symmetry plane is gone.
-    """
-    own = [(name,) if s.components == ("1",) else s.components
-           for s, name in zip(surfaces, names, strict=True)]  # fmt: skip
-    if len(set(chain(*own))) < sum(map(len, own)):
-        own = [
-            c if len(c) == 1 and c[0] == n else tuple(f"{n}.{part}" for part in c)
-            for c, n in zip(own, names, strict=True)
-        ]
-    left = [np.unique(np.asarray(s.tags)[sol.own]) for s, sol in zip(surfaces, solids, strict=True)]
-    number = np.cumsum([0, *map(len, left)])
-    tags = np.empty(len(made.faces), np.int64)
-    for k, surface in enumerate(surfaces):
-        mine = made.surface == k
-        its = np.asarray(surface.tags)[made.face[mine]]
-        tags[mine] = number[k] + np.searchsorted(left[k], its)
-    return tuple(c[i] for c, ids in zip(own, left, strict=True) for i in ids.tolist()), tags
-
-
-def _face_data(surfaces: list[Surface], made: Provenance) -> dict[str, Array]:
-    """What all inputs have under one name and in one shape, from the faces that were cut."""
-    data = {}
-    for name in surfaces[0].face_data:
-        arrays = [np.asarray(s.face_data[name]) for s in surfaces if name in s.face_data]
-        if len(arrays) == len(surfaces) and len({a.shape[1:] for a in arrays}) == 1:
-            first = np.cumsum([0, *map(len, arrays)])
-            data[name] = np.concatenate(arrays)[first[made.surface] + made.face]
-    return data

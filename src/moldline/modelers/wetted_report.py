@@ -39,12 +39,14 @@ class WettedReport:
     """Parts that no edge joins."""
     residual: float
     """How far the formulas are from the boolean's own points at most [m]."""
+    cut: int
+    """Faces that are no face of a component, but a part of one."""
     slivers: int
-    """Faces whose smallest altitude is below `ALTITUDE` of their longest side."""
+    """Those among them whose smallest altitude is below `ALTITUDE` of their longest side."""
     given_slivers: int
-    """As many did the components have."""
+    """As many whole faces of the components, which are as they were given."""
     smallest_altitude: float
-    """The least of those parts."""
+    """The least of those parts among the faces that were cut."""
     notes: tuple[str, ...] = ()
     """What else was done or seen."""
 
@@ -69,8 +71,9 @@ class WettedReport:
             f"{closed}, {_counted(self.pieces, 'piece')}, genus {self.genus}, area "
             f"{self.area:.8g}, volume {self.volume:.8g}",
             f"formulas and boolean differ by {self.residual:.2g} at most",
-            f"{_counted(self.slivers, 'face')} of altitude below {ALTITUDE:g} of the longest side "
-            f"(the components had {self.given_slivers}), the least {self.smallest_altitude:.2g}",
+            f"of {self.cut} faces that were cut {self.slivers} are slivers, of an altitude below "
+            f"{ALTITUDE:g} of the longest side (least {self.smallest_altitude:.2g}); of those that "
+            f"were not {self.given_slivers} are",
             *self.notes,
         ]
 
@@ -79,11 +82,11 @@ def reported(
     surface: Surface,
     counts: tuple[int, int, int],
     residual: float,
-    given: int,
+    is_cut: np.ndarray,
     axis: int | None,
     notes: tuple[str, ...],
 ) -> WettedReport:
-    """Measure a wetted surface; `counts` are its points of each kind, `given` slivers before."""
+    """Measure a wetted surface; `counts` are its points of each kind."""
     edges = topology.edges(surface.faces)
     loops = topology.boundary_loops(surface.faces)
     pieces, _ = topology.pieces(surface.faces)
@@ -110,9 +113,10 @@ def reported(
         genus=pieces - euler // 2,
         pieces=pieces,
         residual=residual,
-        slivers=int(np.sum(shares < ALTITUDE)),
-        given_slivers=given,
-        smallest_altitude=float(shares.min(initial=1.0)),
+        cut=int(is_cut.sum()),
+        slivers=int(np.sum(shares[is_cut] < ALTITUDE)),
+        given_slivers=int(np.sum(shares[~is_cut] < ALTITUDE)),
+        smallest_altitude=float(shares[is_cut].min(initial=1.0)),
         notes=notes,
     )
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 
-import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
@@ -82,7 +81,7 @@ class Assembly:
     def _construct(self, stage: Construction) -> None:
         if "/" in stage.to or stage.to in self._sources:
             raise ParameterError(
-                f"stage {stage.name!r}: to = {stage.to!r} is taken, or has a slash"
+                f"stage {stage.name!r}: to = {stage.to!r} is another geometry's name, or has a slash"
             )
         for name in stage.of:
             check_name(name, self.names)
@@ -145,7 +144,8 @@ def taken(branch: Branch, points: Array) -> Geometry:
     """A geometry as another is made from it; a component without a name goes by the geometry's."""
     geometry = branch.geometry.moved(np.asarray(points))
     if isinstance(geometry, Surface) and geometry.components == UNNAMED:
-        return eqx.tree_at(lambda s: s.components, geometry, (branch.name,))
+        data = geometry.point_data, geometry.face_data
+        return Surface(geometry.points, geometry.faces, geometry.tags, (branch.name,), *data)
     return geometry
 
 

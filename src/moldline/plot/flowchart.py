@@ -13,6 +13,9 @@ from .surfaces import draw_surface
 COLUMN, LINE, BOX = 3.6, 2.0, (2.9, 1.3)
 """Distances between boxes, and their size [in]."""
 
+THUMBNAIL = 2.2
+"""Width of a surface's picture [in]."""
+
 MADE, GIVEN, DEFORMS = "#dcebd8", "#e8e8e8", "#dbe6f2"
 LONGEST = 34
 """Letters that fit into a box."""
@@ -36,7 +39,8 @@ def of_pipeline(pipeline: Pipeline, values: Values | None = None, title: str = "
         ends[row.geometry] = _row(axes, row, depth[row.geometry], y, row.geometry == told.result)
         first = 0.3 + COLUMN * depth[row.geometry], y
         for other in row.of:
-            _arrow(axes, ends[other], first, 0.25)
+            below = ends[other][0] + 0.15 + THUMBNAIL / 2, ends[other][1] - 0.72
+            _arrow(axes, below, first, "angle3,angleA=-90,angleB=0")
         shape = here.of(row.geometry)(values)
         if isinstance(shape, Surface):
             _thumbnail(figure, shape, ends[row.geometry], (width, height))
@@ -44,11 +48,11 @@ def of_pipeline(pipeline: Pipeline, values: Values | None = None, title: str = "
 
 
 def _depths(told: Overview) -> dict[str, int]:
-    """The column in which each geometry begins: behind all that it is made from."""
+    """The column in which each geometry begins: behind the pictures of what it is made from."""
     found: dict[str, int] = {}
     length = {row.geometry: len(row.steps) for row in told.rows}
     for row in told.rows:
-        found[row.geometry] = max((found[name] + length[name] for name in row.of), default=0)
+        found[row.geometry] = max((found[name] + length[name] + 1 for name in row.of), default=0)
     return found
 
 
@@ -104,12 +108,17 @@ def _wrapped(variables: tuple[str, ...]) -> list[str]:
 
 
 def _arrow(
-    axes: Axes, start: tuple[float, float], end: tuple[float, float], bend: float = 0.0
+    axes: Axes, start: tuple[float, float], end: tuple[float, float], curve: str = "arc3"
 ) -> None:
-    curve = f"arc3,rad={bend if end[1] < start[1] else -bend}"
     axes.add_patch(
         FancyArrowPatch(
-            start, end, arrowstyle="-|>", mutation_scale=14, color="#444444", connectionstyle=curve
+            start,
+            end,
+            arrowstyle="-|>",
+            mutation_scale=14,
+            color="#444444",
+            connectionstyle=curve,
+            shrinkA=0,
         )
     )
 
@@ -120,6 +129,6 @@ def _thumbnail(
     """The surface at the end of its line."""
     x, y = end
     low = ((x + 0.15) / size[0], (y - 0.5) / size[1])
-    axes = figure.add_axes((*low, 0.62 * COLUMN / size[0], 1.0 / size[1]))
+    axes = figure.add_axes((*low, THUMBNAIL / size[0], 1.0 / size[1]))
     draw_surface(axes, surface.points, surface.faces)
     axes.axis("off")

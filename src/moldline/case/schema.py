@@ -89,7 +89,8 @@ class StageTable(BaseModel):
 
 
 def _kind(table: Any) -> str:
-    return options.MAKES if isinstance(table, dict) and "modeler" in table else options.DEFORMS
+    is_read = isinstance(table, dict) and "modeler" in table
+    return options.MAKES if is_read or isinstance(table, ConstructionTable) else options.DEFORMS
 
 
 AnyStage = Annotated[

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import GeometryError
 from ..mesh.crossings import overlaps
+from .provenance import Provenance
 from .solids import Solid
 from .wetted_state import WettedState
 
@@ -41,7 +42,8 @@ def check_coplanar(solids: Sequence[Solid], state: WettedState) -> None:
 def apart(solids: Sequence[Solid], state: WettedState) -> list[str]:
     """Sentences on components that cross no other, and whether they lie within another."""
     joins, inside = state.joins(), state.encloses()
-    told = []
+    told: list[str] = []
+    partners: set[frozenset[str]] = set()
     for k, one in enumerate(solids):
         if joins[k].any():
             continue
@@ -51,6 +53,9 @@ def apart(solids: Sequence[Solid], state: WettedState) -> list[str]:
             told.append(f"{one.name} lies wholly inside {around[0]}")
             continue
         gap, other, place = _nearest(solids, k)
+        if frozenset((one.name, other)) in partners:
+            continue
+        partners.add(frozenset((one.name, other)))
         told.append(
             f"{one.name} crosses no other component: the nearest is {other}, {gap:.4g} away near "
             f"{_place(place)}"
@@ -58,6 +63,22 @@ def apart(solids: Sequence[Solid], state: WettedState) -> list[str]:
             else f"{one.name} touches {other} in a point or an edge only, near {_place(place)}"
         )
     return told
+
+
+def grazing(solids: Sequence[Solid], state: WettedState, made: Provenance) -> list[str]:
+    """Sentences on components that meet others, but have no point with them on the result."""
+    first = np.cumsum([0, *(len(s.points) for s in solids)])
+    # the first end of an edge and the first corners of triangles are points of the inputs
+    ends = np.concatenate([made.edges[:, [0, 2]].ravel(), made.triples[:, ::3].ravel()])
+    meets = np.isin(np.arange(len(solids)), np.searchsorted(first, ends, side="right") - 1)
+    told = []
+    for k in np.flatnonzero(~meets & state.joins().any(axis=1) & np.isin(
+        np.arange(len(solids)), made.surface)).tolist():  # fmt: skip
+        _, other, place = _nearest(solids, k)
+        told.append(
+            f"{solids[k].name} touches {other} in a point or an edge only, near {_place(place)}"
+        )
+    return told[:1] if len(solids) == 2 else told
 
 
 def groups(state: WettedState) -> int:

@@ -12,7 +12,7 @@ from .assembly import assembled
 from .base import AbstractModeler
 from .provenance import joined
 from .solids import Plane, Solid, check, extent, solid, symmetry_plane
-from .touching import apart, check_coplanar, groups
+from .touching import apart, check_coplanar, grazing, groups
 from .wetted_state import WettedState
 from .wetting import Wetting
 
@@ -92,8 +92,9 @@ class Union(AbstractModeler):
         solids = self._solids(surfaces, called, plane)
         state = WettedState(solids, plane)
         check_coplanar(solids, state)
-        notes = self._notes(solids, state)
+        notes = self._apart(apart(solids, state), solids, groups(state))
         made = joined(solids)
+        notes = (*notes, *self._apart(grazing(solids, state, made), solids, 1))
         cleans = self.slivers == "clean"
         geometry, report, follow = assembled(
             surfaces,
@@ -126,15 +127,15 @@ class Union(AbstractModeler):
             check(solids[-1], plane, self.crossings == "refuse")
         return solids
 
-    def _notes(self, solids: list[Solid], state: WettedState) -> tuple[str, ...]:
-        if groups(state) == 1:
-            return ()
-        told = apart(solids, state)
+    def _apart(self, told: list[str], solids: list[Solid], groups: int) -> tuple[str, ...]:
+        """The sentences, where components may be apart."""
         if self.apart == "allow":
             return tuple(told)
+        if not told and groups > 1:
+            names = ", ".join(s.name for s in solids)
+            told = [f"{names} cross in {groups} groups that do not touch each other"]
         if not told:
-            sets = ", ".join(s.name for s in solids)
-            told = [f"{sets} cross in {groups(state)} groups that do not touch each other"]
+            return ()
         raise GeometryError(
             f"{'; '.join(told)}: components of one wetted surface must run through each other; "
             'move them together, leave one out, or say apart="allow"'

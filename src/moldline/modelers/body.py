@@ -16,6 +16,7 @@ from .base import AbstractShape, shaped
 from .body_loft import body_weights
 from .loft import Lofting, row_places
 from .quantities import (
+    Numbers,
     Quantities,
     choices,
     even_ring,
@@ -65,15 +66,15 @@ class Body(AbstractShape):
 
     def __init__(
         self,
-        length: float | Sequence[float],
-        radius: float | Sequence[float] | None = None,
+        length: Numbers,
+        radius: Numbers | None = None,
         *,
-        width: float | Sequence[float] | None = None,
-        height: float | Sequence[float] | None = None,
-        lift: float | Sequence[float] = 0.0,
-        exponent: float | Sequence[float] = 2.0,
-        lower_exponent: float | Sequence[float] | None = None,
-        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        width: Numbers | None = None,
+        height: Numbers | None = None,
+        lift: Numbers = 0.0,
+        exponent: Numbers = 2.0,
+        lower_exponent: Numbers | None = None,
+        origin: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
         loft: Lofting = "linear",
         nose: End = "round",
         tail: End = "round",

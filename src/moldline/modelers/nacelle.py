@@ -16,6 +16,7 @@ from .airfoils import airfoil as airfoil_of
 from .base import AbstractShape, shaped
 from .profile import Profile, scaled
 from .quantities import (
+    Numbers,
     Quantities,
     base_points_of,
     even_ring,
@@ -70,16 +71,16 @@ class Nacelle(AbstractShape):
     def __init__(
         self,
         length: float,
-        radius: float | Sequence[float],
-        exit_radius: float | Sequence[float] | None = None,
+        radius: Numbers,
+        exit_radius: Numbers | None = None,
         *,
-        thickness: float | Sequence[float] | None = None,
+        thickness: Numbers | None = None,
         camber: float = 1.0,
         droop: float = 0.0,
         scarf: float = 0.0,
         airfoil: Any = "naca 0012",
         section_parameters: bool | list[str] = False,
-        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        origin: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
         degrees: bool = False,
         half: bool = False,
         chordwise: int = 65,

@@ -1,7 +1,7 @@
 """The named numbers that a shape is made of, in one vector."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -10,6 +10,9 @@ from jaxtyping import Float
 
 from .._types import Array, Vector
 from ..errors import ParameterError
+
+Numbers: TypeAlias = float | Sequence[float] | np.ndarray
+"""One number for all stations, or one each."""
 
 
 class Quantities(eqx.Module):
@@ -137,7 +140,7 @@ def station_count(each: Mapping[str, Any], panels: Mapping[str, Any], what: str)
     What speaks of each station has one entry for it, what speaks of panels one less.
     """
     said = {name: len(given) for name, given in each.items() if _is_list(given)}
-    said |= {name: len(given) + 1 for name, given in panels.items() if np.ndim(given)}
+    said |= {name: len(given) + 1 for name, given in panels.items() if _is_list(given)}
     if len(set(said.values())) > 1:
         told = ", ".join(f"{name} for {count}" for name, count in said.items())
         raise ParameterError(
@@ -163,4 +166,4 @@ def placed(origin: Any, is_halved: bool, what: str) -> np.ndarray:
 
 
 def _is_list(given: Any) -> bool:
-    return isinstance(given, list | tuple)
+    return isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim > 0)

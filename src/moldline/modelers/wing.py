@@ -17,6 +17,7 @@ from .base import AbstractShape, shaped
 from .loft import Lofting, loft_weights, row_places
 from .profile import Profile, scaled
 from .quantities import (
+    Numbers,
     Quantities,
     base_points_of,
     choices,
@@ -89,17 +90,17 @@ class Wing(AbstractShape):
 
     def __init__(
         self,
-        span: float | Sequence[float],
-        chord: float | Sequence[float],
+        span: Numbers,
+        chord: Numbers,
         *,
-        sweep: float | Sequence[float] = 0.0,
-        dihedral: float | Sequence[float] = 0.0,
-        twist: float | Sequence[float] = 0.0,
-        thickness: float | Sequence[float] | None = None,
-        camber: float | Sequence[float] = 1.0,
+        sweep: Numbers = 0.0,
+        dihedral: Numbers = 0.0,
+        twist: Numbers = 0.0,
+        thickness: Numbers | None = None,
+        camber: Numbers = 1.0,
         airfoil: Any = "naca 0012",
         section_parameters: bool | list[str] = False,
-        origin: Sequence[float] = (0.0, 0.0, 0.0),
+        origin: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
         degrees: bool = False,
         sweep_at: float = 0.0,
         twist_at: float = 0.25,

@@ -48,10 +48,10 @@ def test_a_blunt_section_is_closed_across_its_base(base):
 
 @pytest.mark.parametrize("made", FAMILIES, ids=lambda a: a.name)
 def test_every_family_is_finite_at_its_nose_in_both_modes_and_by_the_stations(made):
-    place = made.outline.stations
+    place = made.outline.stations[[0, 1, -1]]
     for derivative in (jax.jacfwd, jax.jacrev):
-        assert np.isfinite(derivative(made)(made.values)).all()
-        assert np.isfinite(derivative(lambda s: made.sides(made.values, s))(place[:5])).all()
+        slopes = jax.jit(derivative(lambda p, s: made.sides(p, s), argnums=(0, 1)))
+        assert all(np.isfinite(slope).all() for slope in slopes(made.values, place))
 
 
 @pytest.mark.parametrize("made", FAMILIES, ids=lambda a: a.name)

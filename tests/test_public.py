@@ -6,10 +6,12 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "AbstractDeformer", "AbstractNumpyDeformer", "BodySkeleton", "Bone", "Bones",
-    "Cage", "Cloud", "Constraint", "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge",
-    "Lattice", "LinearBinding", "Link", "Measurements", "Pilots", "Pipeline", "Planform", "Section",
-    "Skeleton", "Spot", "Stage", "Surface", "Variable", "VolumeMesh", "WingSkeleton", "errors",
+    "AbstractBinding", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
+    "BodySkeleton", "Bone", "Bones", "Cage", "Cloud", "Constraint", "Construction",
+    "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
+    "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle", "Pilots",
+    "Pipeline", "Planform", "Section", "Skeleton", "Spot", "Stage", "Subdivision", "Surface",
+    "Tabulated", "Union", "Variable", "VolumeMesh", "Wing", "WingSkeleton", "airfoil", "errors",
     "links", "load", "measures", "planform", "plot", "read", "read_sensitivities", "variable",
     "write", "write_sensitivities",
 }  # fmt: skip

@@ -114,8 +114,8 @@ class Body(AbstractShape):
     ) -> None:
         """Where the rows of points lie, and what each has of the stations."""
         given = self.quantities.parted(self.values)
-        x = self.reach @ np.asarray(given["length"])
-        size = np.max([np.asarray(self._full(v)) for v in self._halves(given)], axis=0)
+        x, size = self.reach @ given["length"], np.zeros(len(self.reach))
+        size[self.free] = np.maximum(*self._halves(given))
         run = np.cumsum(np.hypot(np.diff(x, prepend=x[0]), np.diff(size, prepend=size[0])))
         rows = row_places(run, along, clustering)
         is_flat = size[[0, -1]] > 0

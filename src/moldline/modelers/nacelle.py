@@ -109,18 +109,24 @@ class Nacelle(AbstractShape):
         own["origin"] = placed(origin, half, "half a nacelle")
         sections = {f"section {key}": numbers for key, numbers in self.profile.numbers.items()}
         self.quantities = Quantities(own | sections)
-        self._check()
 
     def _ring(self, around: int, half: bool, name: str) -> None:
         self.rows, self.is_whole, self.name = even_ring(around) + 1, not half, name
 
-    def _check(self) -> None:
-        radius = np.asarray(self._meridians(self.quantities.parted(self.values))[1])
-        if not np.all(radius > 0):
+    def __check_init__(self) -> None:
+        start = self.quantities.parted(self.values)["origin"]
+        y = np.asarray(shaped(self, self.values))[:, 1]
+        least = y[: self.rows * self._row].min() - (start[1] if len(start) == 3 else 0.0)
+        if least < 0:
             raise GeometryError(
-                f"the duct closes: its radius falls to {float(radius.min()):.6g}; a larger radius "
-                "or exit_radius, or a thinner section keeps it open"
+                f"the duct closes: its radius falls to {least:.6g} or below; a larger radius or "
+                "exit_radius, or a thinner section keeps it open"
             )
+
+    @property
+    def _row(self) -> int:
+        """Points in a row."""
+        return 2 * len(self.profile.stations) - (1 if self.is_blunt else 2) + self.base
 
     @classmethod
     @override
@@ -177,9 +183,7 @@ class Nacelle(AbstractShape):
         count = self.rows
         sides = jnp.broadcast_to(sides, (count, *sides.shape))
         factor = self._blended(given["thickness"]) / self.profile.thick
-        upper, lower = jnp.moveaxis(
-            scaled(sides, factor, jnp.broadcast_to(given["camber"], (count,))), 1, 0
-        )
+        upper, lower = scaled(sides, factor, jnp.broadcast_to(given["camber"], (count,)))
         share = jnp.linspace(0, 1, self.base + 2)[1:-1, None]
         base = (1 - share) * upper[:, -1:] + share * lower[:, -1:]
         last = upper.shape[1] if self.is_blunt else upper.shape[1] - 1
@@ -198,8 +202,7 @@ class Nacelle(AbstractShape):
     def _faces(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Triangles, and for each 0, or 1 in the duct; a base is the cowl's."""
         side, rows = len(self.profile.stations), self.rows
-        count = 2 * side - (1 if self.is_blunt else 2) + self.base
-        number = np.arange(rows * count).reshape(rows, count)
+        number = np.arange(rows * self._row).reshape(rows, -1)
         upper = number[:, :side]
         rest = number[:, side:] if self.is_blunt else np.hstack([number[:, side:], upper[:, -1:]])
         lower = np.hstack([number[:, :1], rest[:, : side - 1]])

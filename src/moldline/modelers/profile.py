@@ -1,7 +1,6 @@
 """An airfoil in a wing or a nacelle: at their stations, with their thickness and camber."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -42,8 +41,8 @@ class Profile(eqx.Module):
     def __init__(self, airfoil: AbstractAirfoil, at: np.ndarray, wanted: bool | list[str]):
         self.airfoil, self.stations = airfoil, at
         self.own = np.asarray(airfoil.values, float)
-        self.drawn = np.asarray(airfoil.sides(airfoil.values, at))
-        self.thick = _thickest(airfoil)
+        self.drawn = np.asarray(_drawn(airfoil, self.own, at))
+        self.thick = _thickest(airfoil, self.own)
         self.exposed = _wanted(airfoil, wanted)
 
     @property
@@ -61,17 +60,22 @@ class Profile(eqx.Module):
         return self.airfoil.sides(values, self.stations)
 
 
-def scaled(sides: Array, thickness: Array, camber: Array) -> Array:
-    """Sides, shape (..., 2, c, 2), with so many times the thickness and the camber.
+def scaled(sides: Array, thickness: Array, camber: Array) -> tuple[Array, Array]:
+    """Upper and lower sides, out of (..., 2, c, 2), with so many times the thickness and camber.
 
     What is halfway between points that face each other is scaled across the chord, and what they
     are off it along the line that joins them.
     """
-    upper, lower = sides[..., :1, :, :], sides[..., 1:, :, :]
-    middle = jnp.asarray((upper + lower) / 2)
-    half = jnp.asarray(thickness)[..., None, None, None] * (upper - lower) / 2
-    middle = middle.at[..., 1].multiply(jnp.asarray(camber)[..., None, None])
-    return jnp.concatenate([middle + half, middle - half], axis=-3)
+    upper, lower = sides[..., 0, :, :], sides[..., 1, :, :]
+    across, along = np.array([0.0, 1.0]), np.array([1.0, 0.0])
+    middle = (upper + lower) / 2 * (camber[..., None, None] * across + along)
+    half = (upper - lower) / 2 * thickness[..., None, None]
+    return middle + half, middle - half
+
+
+@eqx.filter_jit
+def _drawn(airfoil: AbstractAirfoil, values: Array, at: Array) -> Array:
+    return airfoil.sides(values, at)
 
 
 def _wanted(airfoil: AbstractAirfoil, wanted: bool | list[str]) -> tuple[str, ...]:
@@ -87,9 +91,9 @@ def _wanted(airfoil: AbstractAirfoil, wanted: bool | list[str]) -> tuple[str, ..
     return tuple(wanted)
 
 
-def _thickest(airfoil: Any) -> float:
+def _thickest(airfoil: AbstractAirfoil, values: np.ndarray) -> float:
     """The greatest distance of the two sides, between close stations by a parabola."""
-    upper, lower = np.asarray(airfoil.sides(airfoil.values, stations(None, 2001)))
+    upper, lower = np.asarray(_drawn(airfoil, values, stations(None, 2001)))
     gap = np.linalg.norm(upper - lower, axis=1)
     k = int(np.clip(np.argmax(gap), 1, len(gap) - 2))
     before, most, after = gap[k - 1 : k + 2]

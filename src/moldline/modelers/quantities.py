@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import equinox as eqx
-import jax.numpy as jnp
+import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -51,7 +51,7 @@ class Quantities(eqx.Module):
 
     def parted(self, vector: Vector) -> dict[str, Array]:
         """The numbers of each name, out of other ones in the same order."""
-        vector = jnp.asarray(vector)
+        vector = vector if isinstance(vector, jax.Array) else np.asarray(vector)
         size = sum(map(len, self.numbers))
         if vector.shape != (size,):
             raise ParameterError(

@@ -179,7 +179,9 @@ class Wing(AbstractShape):
 
     def _laid(self, base_points: int, tip: str, root: str, sides: int) -> WingLayout:
         blunt = self.profiles[0].airfoil.is_blunt
-        outlines = np.asarray(self._outlines(self.quantities.parted(self.values)))
+        given = self.quantities.parted(self.values)
+        drawn = np.stack([profile.drawn for profile in self.profiles])
+        outlines = np.stack(self._scaled(drawn, given), axis=1)
         return WingLayout(
             rows=len(self.weights),
             side=outlines.shape[2],
@@ -259,9 +261,13 @@ class Wing(AbstractShape):
         sides = []
         for s, profile in enumerate(self.profiles):
             sides.append(profile.sides({k: given[f"section {s} {k}"] for k in profile.exposed}))
-        thick = jnp.stack([jnp.asarray(profile.thick) for profile in self.profiles])
-        camber = jnp.broadcast_to(given["camber"], thick.shape)
-        return scaled(jnp.stack(sides), given["thickness"] / thick, camber)
+        return jnp.stack(self._scaled(jnp.stack(sides), given), axis=1)
+
+    def _scaled(self, sides: Array, given: Mapping[str, Array]) -> tuple[Array, Array]:
+        """With the thickness and camber asked for."""
+        one = np.ones(len(self.profiles))
+        thick = one * np.array([profile.thick for profile in self.profiles])
+        return scaled(sides, one * given["thickness"] / thick, one * given["camber"])
 
     @property
     @override

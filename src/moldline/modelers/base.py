@@ -2,6 +2,7 @@
 
 import abc
 import inspect
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,11 @@ class AbstractModeler(eqx.Module):
         """The least and the most geometries that it is made from."""
 
     @abc.abstractmethod
-    def bind(self, *geometries: Geometry) -> AbstractMaking:
-        """Tie it to geometries, with all done that moving them does not affect."""
+    def bind(self, *geometries: Geometry, names: Sequence[str] | None = None) -> AbstractMaking:
+        """Tie it to geometries, with all done that moving them does not affect.
+
+        `names` are what errors and reports call them.
+        """
 
     @classmethod
     def build(cls, folder: Path, **options: Any) -> "AbstractModeler":
@@ -94,8 +98,8 @@ class AbstractShape(AbstractModeler):
         return (0, 0)
 
     @override
-    def bind(self, *geometries: Geometry) -> AbstractMaking:
-        return Shaped(self, self.geometry)
+    def bind(self, *geometries: Geometry, names: Sequence[str] | None = None) -> AbstractMaking:
+        return Shaped(shape=self, geometry=self.geometry)
 
 
 class Shaped(AbstractMaking):

@@ -1,5 +1,6 @@
 """Loop's subdivision: a smooth, fine surface from a coarse one by a constant sparse matrix."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
@@ -81,7 +82,7 @@ class Subdivision(AbstractModeler):
         return (1, 1)
 
     @override
-    def bind(self, *geometries: Geometry) -> "Subdivided":
+    def bind(self, *geometries: Geometry, names: Sequence[str] | None = None) -> "Subdivided":
         surface = _only_surface(geometries)
         faces, count = np.asarray(surface.faces, np.int64), len(surface.points)
         if len(faces) * 4**self.levels > MOST_FACES:

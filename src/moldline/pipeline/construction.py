@@ -75,6 +75,6 @@ class Construction(eqx.Module):
     def bind(self, geometries: Sequence[Geometry]) -> AbstractMaking:
         """The modeler tied to geometries; an error names the stage."""
         try:
-            return self.modeler.bind(*geometries)
+            return self.modeler.bind(*geometries, names=self.of)
         except GeometryError as error:
             raise GeometryError(f"stage {self.name!r}: {error}") from None

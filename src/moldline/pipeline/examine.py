@@ -221,7 +221,7 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
     """Prove the derivatives at these values along a random direction of typical size."""
     rng = np.random.default_rng(seed)
     full = pipeline.values(values)
-    along = {
+    along: dict[str, Array] = {
         name: jnp.asarray(variable.typical * rng.uniform(-1, 1, variable.size))
         for name, variable in pipeline.variables.items()
     }

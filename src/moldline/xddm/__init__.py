@@ -1,0 +1,1 @@
+"""SERVE: XDDM documents, and answers to a design framework."""

@@ -24,7 +24,7 @@ class Provenance(NamedTuple):
     surface, face
         The input of each face, and its face there.
     kept
-        Points that are points of inputs, ascending.
+        Points that are points of inputs, ascending; where fans of faces touch in a point, twice.
     edges
         Nodes of an edge (2) and of the triangle that it runs through (3).
     triples
@@ -72,23 +72,22 @@ def joined(solids: Sequence[Solid]) -> Provenance:
     fresh = used[source[used] < 0]
     found = traced(Sources(everything.nodes, everything.faces, everything.surface,
                            everything.points), places, faces, face, fresh)  # fmt: skip
-    edges, walls = _in_plane(everything, found.edges)
+    # in an order that does not depend on the boolean, so that unions of moved parts compare
+    one, other = np.lexsort(found.edges.T[::-1]), np.lexsort(found.triples.T[::-1])
+    edges, walls = _in_plane(everything, found.edges[one])
+    old = used[source[used] >= 0]
+    old = old[np.argsort(source[old], kind="stable")]
+    # points of two fans that touch stay two, as manifold3d has them, so that edges stay manifold
     key = np.full(len(places), -1)
-    kept, key_of_kept = np.unique(source[used[source[used] >= 0]], return_inverse=True)
-    key[used[source[used] >= 0]] = key_of_kept
-    rows, row = np.unique(edges, axis=0, return_inverse=True)
-    key[found.on_edges] = len(kept) + row.ravel()
-    key[found.on_triples] = len(kept) + len(rows) + np.arange(len(found.triples))
-    new_faces, face = key[faces[stays]], face[stays]
-    is_proper = (new_faces != np.roll(new_faces, 1, axis=1)).all(axis=1)
-    new_faces, face = new_faces[is_proper], face[is_proper]
+    key[np.concatenate([old, found.on_edges[one], found.on_triples[other]])] = np.arange(len(used))
+    face = face[stays]
     return Provenance(
-        new_faces,
+        key[faces[stays]],
         everything.surface[face],
         everything.own[face],
-        kept,
-        rows.reshape(-1, 5),
-        found.triples,
+        source[old],
+        edges,
+        found.triples[other],
         walls,
         found.residual,
     )

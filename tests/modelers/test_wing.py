@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from moldline.case.options import model_of
-from moldline.errors import ParameterError
+from moldline.errors import GeometryError, ParameterError
 from moldline.mesh import quality
 from moldline.mesh.health import health
 from moldline.mesh.planform import planform
@@ -219,6 +219,16 @@ def test_a_pylon_is_a_wing_along_another_axis(along, tip):
     np.testing.assert_array_equal(np.asarray(turned.points)[:, 0], np.asarray(plain.points)[:, 0])
 
 
+def test_the_origin_is_where_the_root_s_leading_edge_is_whichever_way_a_wing_stands():
+    for along in ("y", "-y", "z", "-z"):
+        plain, placed = (
+            Wing(2.0, [2.0, 1.0], along=along, origin=place, **SMALL).geometry.points
+            for place in ((0.0, 0.0, 0.0), (5.0, 2.0, -1.0))
+        )
+        np.testing.assert_allclose(placed - plain, np.tile([5.0, 2.0, -1.0], (len(plain), 1)))
+        assert np.any(np.all(placed == [5.0, 2.0, -1.0], axis=1))
+
+
 def test_caps_have_well_shaped_triangles():
     wing = Wing(**SWEPT, chordwise=65, spanwise=64).geometry
     angles = np.degrees(quality.smallest_angles(wing))
@@ -272,6 +282,7 @@ def test_a_case_file_can_say_all_of_it():
         ({"clustering": 2.0}, "clustering lies from 0"),
         ({"base_points": 2}, "0 where the trailing edge is sharp"),
         ({"sides": 2, "origin": [0.0, 1.0, 0.0]}, "a wing with two sides begins at y = 0"),
+        ({"sides": 2, "along": "z"}, "a wing with two sides lies along y, got along = 'z'"),
         ({"section_parameters": ["upper"]}, "NACA 0012 has no parameter 'upper'.*camber, crest"),
         ({"airfoil": ["naca 0012", BLUNT, "naca 0012"]}, "all be blunt or all be sharp"),
         ({"origin": [0.0, 0.0]}, r"origin is a place \(x, y, z\)"),
@@ -282,6 +293,11 @@ def test_a_case_file_can_say_all_of_it():
 def test_what_cannot_be_built_says_why(options, message):
     with pytest.raises(ParameterError, match=message):
         Wing(**({"span": [4.0, 10.0], "chord": [3.0, 2.0, 1.0]} | options))
+
+
+def test_a_cubic_that_falls_below_nothing_is_refused():
+    with pytest.raises(GeometryError, match="falls below 0 between its stations; use more"):
+        Wing([1.0, 2.0, 10.0, 11.0], [5.0, 5.0, 0.1, 0.1, 5.0], loft="cubic")
 
 
 def test_a_trapezium_wants_its_area_or_its_chord():

@@ -10,7 +10,7 @@ import numpy as np
 from typing_extensions import override
 
 from .._types import Array, Points, Vector
-from ..errors import ParameterError
+from ..errors import GeometryError, ParameterError
 from ..mesh import Surface
 from .airfoils import airfoil as airfoil_of
 from .base import AbstractShape, shaped
@@ -118,6 +118,8 @@ class Wing(AbstractShape):
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
         choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
+        if sides == 2 and along != "y":
+            raise ParameterError(f"a wing with two sides lies along y, got along = {along!r}")
         angles = radians(degrees, sweep=sweep, dihedral=dihedral, twist=twist)
         panels: dict[str, Any] = {key: angles[key] for key in ("sweep", "dihedral")}
         each: dict[str, Any] = {"chord": chord, "twist": angles["twist"], "thickness": thickness}
@@ -173,6 +175,12 @@ class Wing(AbstractShape):
         places = self.reach @ span / span[-1]
         rows = row_places(places, spanwise, clustering, (False, True))
         self.weights = loft_weights(places, rows, loft)
+        chord = np.broadcast_to(self.quantities.parted(self.values)["chord"], len(places))
+        if np.any(np.diff(self.weights @ places) <= 0) or np.any(self.weights @ chord <= 0):
+            raise GeometryError(
+                f"a {loft} loft through chords of {chord.tolist()} turns back or falls below 0 "
+                "between its stations; use more stations, or loft = 'linear'"
+            )
         self.slope = loft_weights(places, rows[-1:], loft, 1)[0]
         beyond = np.clip((rows - places[-2]) / (1 - places[-2]), 0, 1)
         self.thinning = np.sqrt(1 - beyond**2) if tip == "closed" else np.ones(len(rows))
@@ -239,10 +247,12 @@ class Wing(AbstractShape):
         grown = jnp.einsum("s,asp->pa", self.slope, at) / (self.slope @ leading[:, 1])
         slopes = jnp.stack([grown[:, 0], jnp.ones(len(grown)), grown[:, 1]], axis=1)
         points = self.layout.points(upper, lower, slopes.reshape(2, -1, 3))
-        return points if self.along == "y" else points @ _AXES[self.along]
+        points = points if self.along == "y" else points @ _AXES[self.along]
+        place = given["origin"]
+        return points + (place if len(place) == 3 else jnp.stack([place[0], 0.0, place[1]]))
 
     def _frames(self, given: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-        """Leading edge, chord and twist of each station."""
+        """Leading edge, from the origin, chord and twist of each station."""
         count = self.weights.shape[1]
         chord, twist = (jnp.broadcast_to(given[key], (count,)) for key in ("chord", "twist"))
         away = self.reach @ given["span"]
@@ -250,11 +260,9 @@ class Wing(AbstractShape):
             jnp.concatenate([jnp.zeros(1), jnp.cumsum(jnp.diff(away) * jnp.tan(given[key]))])
             for key in ("sweep", "dihedral")
         ]
-        start = given["origin"]
-        y = away + (start[1] if len(start) == 3 else 0.0)
-        x = start[0] + runs[0] + self.sweep_at * (chord[0] - chord * jnp.cos(twist))
-        z = start[-1] + runs[1] + self.twist_at * chord * jnp.sin(twist)
-        return jnp.stack([x, y, z], axis=1), chord, twist
+        x = runs[0] + self.sweep_at * (chord[0] - chord * jnp.cos(twist))
+        z = runs[1] + self.twist_at * chord * jnp.sin(twist)
+        return jnp.stack([x, away, z], axis=1), chord, twist
 
     def _outlines(self, given: Mapping[str, Array]) -> Array:
         """Both sides of each station's section for the chord 1, shape (s, 2, c, 2)."""

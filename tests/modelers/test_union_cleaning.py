@@ -106,6 +106,15 @@ def test_its_volume_changes_nearly_as_that_of_the_plain_one(both):
     assert slopes[1] == pytest.approx(slopes[0], abs=1e-3 * area)
 
 
+def test_the_limit_is_the_users():
+    parts = CASES["transport"][0]
+    plain = Union(altitude=0.05).bind(*parts)
+    clean = Union(altitude=0.05, slivers="clean").bind(*parts)
+    assert plain.report.slivers > 100
+    assert clean.report.slivers <= plain.report.slivers / 20
+    assert health(clean.geometry).is_sound
+
+
 def test_slivers_are_measured_by_their_altitude():
     points = np.array([[0, 0, 0], [1, 0, 0], [0.5, ALTITUDE / 2, 0], [0.5, 0.5, 0]])
     faces = np.array([[0, 1, 2], [0, 1, 3]])

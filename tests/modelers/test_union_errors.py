@@ -49,6 +49,8 @@ def test_options_are_checked():
         Union(slivers="remove")
     with pytest.raises(ParameterError, match="tolerance is a length"):
         Union(tolerance=-1.0)
+    with pytest.raises(ParameterError, match="altitude is a part of"):
+        Union(altitude=2.0)
 
 
 def test_an_open_part_is_refused_with_its_place():

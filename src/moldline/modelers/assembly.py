@@ -7,10 +7,10 @@ from jaxtyping import Bool
 
 from .._types import Array
 from ..mesh import Surface
-from .cleaning import Cleaned, cleaned
+from .cleaning import Cleaned, Limits, cleaned
 from .provenance import Provenance
 from .solids import Plane, Solid
-from .wetted_report import ALTITUDE, WettedReport, altitudes, reported
+from .wetted_report import WettedReport, altitudes, reported
 from .wetting import Recipe, followed, recipe
 
 
@@ -20,12 +20,12 @@ def assembled(
     solids: list[Solid],
     plane: Plane | None,
     made: Provenance,
-    tolerance: float | None,
+    limits: Limits,
     notes: tuple[str, ...],
 ) -> tuple[Surface, WettedReport, Recipe]:
     """The wetted surface, what is to be said of it, and how it follows its components.
 
-    With a `tolerance` [m], slivers are taken away.
+    Where the limits have a tolerance, slivers are taken away.
     """
     points = tuple(np.asarray(s.points, float) for s in surfaces)
     offset = np.zeros(3)
@@ -34,15 +34,17 @@ def assembled(
     follow = recipe(points, made, offset)
     places = np.asarray(followed(follow, points)[0])
     components, tags = _components(surfaces, names, solids, made)
-    if tolerance is not None:
-        made, tags, note = _cleaned(surfaces, places, made, tags, tolerance)
+    if limits.tolerance is not None:
+        made, tags, note = _cleaned(surfaces, places, made, tags, limits)
         follow, notes = recipe(points, made, offset), (*notes, note)
         places = np.asarray(followed(follow, points)[0])
     data = _face_data(surfaces, made)
     geometry = Surface(places, made.faces, tags, components, face_data=data)
     counts = len(made.kept), len(made.edges), len(made.triples)
     axis = None if plane is None else plane.axis
-    report = reported(geometry, counts, made.residual, _is_cut(surfaces, made), axis, notes)
+    report = reported(
+        geometry, counts, made.residual, _is_cut(surfaces, made), axis, limits.altitude, notes
+    )
     return geometry, report, follow
 
 
@@ -51,22 +53,23 @@ def _cleaned(
     places: np.ndarray,
     made: Provenance,
     tags: np.ndarray,
-    tolerance: float,
+    limits: Limits,
 ) -> tuple[Provenance, np.ndarray, str]:
     is_cut = _is_cut(surfaces, made)
     every = np.concatenate([np.asarray(s.points, float) for s in surfaces])
     corners = every[_sources(surfaces, made)]
-    found = cleaned(places, made.faces, tags, is_cut, corners, tolerance)
-    before = int(np.sum(altitudes(places, made.faces[is_cut]) < ALTITUDE))
+    found = cleaned(places, made.faces, tags, is_cut, corners, limits)
+    before = int(np.sum(altitudes(places, made.faces[is_cut]) < limits.altitude))
     result = reduced(made, found)
-    after = int(np.sum(altitudes(places, found.faces[_is_cut(surfaces, result)]) < ALTITUDE))
+    left = altitudes(places, found.faces[_is_cut(surfaces, result)])
+    after = int(np.sum(left < limits.altitude))
     gone = len(made.faces) - len(found.faces)
     volumes = _volume(places, made.faces), _volume(places, found.faces)
     note = (
         f"cleaned: {before} slivers along the curves became {after}; {found.collapsed} points "
         f"merged into neighbours, {found.turned} edges turned, {gone} faces fewer; corners are up "
-        f"to {found.moved:.3g} off the planes of their faces, of {tolerance:.3g} allowed; volume "
-        f"changed by {volumes[1] - volumes[0]:.3g}"
+        f"to {found.moved:.3g} off the planes of their faces, of {limits.tolerance:.3g} allowed; "
+        f"volume changed by {volumes[1] - volumes[0]:.3g}"
     )
     return result, tags[found.rows], note
 

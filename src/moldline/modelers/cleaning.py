@@ -6,13 +6,28 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from .wetted_report import ALTITUDE, altitudes
+from .wetted_report import altitudes
 
 PASSES = 20
 """How often all slivers are gone through at most."""
 
 TILT = 0.5
 """A face's normal and that of the face which it is a part of have at least this cosine."""
+
+
+class Limits(NamedTuple):
+    """What counts as a sliver, and what may be done about it.
+
+    Attributes
+    ----------
+    altitude
+        A face is a sliver if its smallest altitude is below this part of its longest side.
+    tolerance
+        How far corners may go off the plane of their face [m]; None cleans nothing.
+    """
+
+    altitude: float
+    tolerance: float | None
 
 
 class Cleaned(NamedTuple):
@@ -52,17 +67,17 @@ def cleaned(
     tags: Int[np.ndarray, "m"],
     is_cut: Bool[np.ndarray, "m"],
     corners: Float[np.ndarray, "m 3 3"],
-    tolerance: float,
+    limits: Limits,
 ) -> Cleaned:
     """Collapse and turn edges of faces that were cut until none of them is a sliver, or no way on.
 
     A point that goes is merged into a neighbour, which stays where it is: points of curves, where
     tags meet or the surface ends, only along their curve, and where curves meet none. An edge is
-    turned only between faces of one tag. All corners stay within `tolerance` [m] of the plane of
+    turned only between faces of one tag. All corners stay within the tolerance of the plane of
     the `corners` of the face that theirs is a part of, faces keep their side, edges and points stay
     manifold; and each step betters the worst of the faces that it changes.
     """
-    patch = _Patch(points, faces, tags, is_cut, corners, tolerance)
+    patch = _Patch(points, faces, tags, is_cut, corners, limits)
     for _ in range(PASSES):
         before = patch.collapsed + patch.turned
         for face in patch.slivers():
@@ -83,10 +98,11 @@ class _Patch:
         tags: np.ndarray,
         is_cut: np.ndarray,
         corners: np.ndarray,
-        tolerance: float,
+        limits: Limits,
     ):
         self.points, self.faces, self.tags = points, faces.copy(), tags
-        self.is_cut, self.tolerance = is_cut.copy(), tolerance
+        self.is_cut = is_cut.copy()
+        self.altitude, self.tolerance = limits.altitude, limits.tolerance or 0.0
         self.is_there = np.ones(len(faces), bool)
         self.collapsed, self.turned, self.moved = 0, 0, 0.0
         a, b, c = (corners[:, k] for k in range(3))
@@ -106,13 +122,13 @@ class _Patch:
         rows = np.flatnonzero(self.is_cut & self.is_there)
         shares = altitudes(self.points, self.faces[rows])
         order = np.argsort(shares, kind="stable")
-        return rows[order[shares[order] < ALTITUDE]].tolist()
+        return rows[order[shares[order] < self.altitude]].tolist()
 
     def better(self, face: int) -> None:
         """Make the best of the changes that rid us of a sliver, if one does."""
         if not self.is_there[face]:
             return
-        if altitudes(self.points, self.faces[face][None])[0] >= ALTITUDE:
+        if altitudes(self.points, self.faces[face][None])[0] >= self.altitude:
             return
         found = [*self._collapses(face), *self._turns(face)]
         if found:

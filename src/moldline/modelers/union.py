@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import equinox as eqx
 import numpy as np
 from typing_extensions import override
 
@@ -10,9 +11,11 @@ from ..errors import GeometryError, ParameterError
 from ..mesh import Geometry, Surface
 from .assembly import assembled
 from .base import AbstractModeler
+from .cleaning import Limits
 from .provenance import joined
 from .solids import Plane, Solid, check, extent, solid, symmetry_plane
 from .touching import apart, check_coplanar, grazing, groups
+from .wetted_report import ALTITUDE
 from .wetted_state import WettedState
 from .wetting import Wetting
 
@@ -45,6 +48,8 @@ class Union(AbstractModeler):
         "clean" takes slivers away that the cut made, by merging points into neighbours and turning
         edges; what is left follows the components by the same formulas. "keep" leaves the cut as
         it is, which alone has the exact volume.
+    altitude
+        A face is a sliver if its smallest altitude is below this part of its longest side.
     tolerance
         How far cleaning may take a corner off the plane of its face [m]; by default `CLEAN` of the
         extent.
@@ -54,11 +59,12 @@ class Union(AbstractModeler):
     The boolean is by manifold3d, which calls which part of a face is left.
     """
 
-    symmetry: str | None = None
-    apart: str = "refuse"
-    crossings: str = "refuse"
-    slivers: str = "keep"
-    tolerance: float | None = None
+    symmetry: str | None = eqx.field(default=None, static=True)
+    apart: str = eqx.field(default="refuse", static=True)
+    crossings: str = eqx.field(default="refuse", static=True)
+    slivers: str = eqx.field(default="keep", static=True)
+    altitude: float = eqx.field(default=ALTITUDE, static=True)
+    tolerance: float | None = eqx.field(default=None, static=True)
 
     def __check_init__(self) -> None:
         choices = {
@@ -73,6 +79,10 @@ class Union(AbstractModeler):
                     f"a union's {name} is one of {', '.join(map(repr, allowed))}, got "
                     f"{getattr(self, name)!r}"
                 )
+        if not 0 <= self.altitude <= np.sqrt(3) / 2:
+            raise ParameterError(
+                f"a union's altitude is a part of a face's longest side, got {self.altitude}"
+            )
         if self.tolerance is not None and not 0 < self.tolerance < np.inf:
             raise ParameterError(f"a union's tolerance is a length [m], got {self.tolerance}")
 
@@ -95,22 +105,15 @@ class Union(AbstractModeler):
         notes = self._apart(apart(solids, state), solids, groups(state))
         made = joined(solids)
         notes = (*notes, *self._apart(grazing(solids, state, made), solids, 1))
-        cleans = self.slivers == "clean"
         geometry, report, follow = assembled(
-            surfaces,
-            called,
-            solids,
-            plane,
-            made,
-            self._tolerance(solids) if cleans else None,
-            notes,
+            surfaces, called, solids, plane, made, self._limits(solids), notes
         )
         return Wetting(geometry, report, follow, state)
 
-    def _tolerance(self, solids: list[Solid]) -> float:
-        return (
-            CLEAN * extent(s.points for s in solids) if self.tolerance is None else self.tolerance
-        )
+    def _limits(self, solids: list[Solid]) -> Limits:
+        if self.slivers == "keep":
+            return Limits(self.altitude, None)
+        return Limits(self.altitude, self.tolerance or CLEAN * extent(s.points for s in solids))
 
     def _plane(self, surfaces: list[Surface], names: list[str]) -> Plane | None:
         if self.symmetry is None:

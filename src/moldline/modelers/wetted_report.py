@@ -8,7 +8,8 @@ import numpy as np
 from ..mesh import Surface, quality, topology
 
 ALTITUDE = 0.01
-"""A face is a sliver if its smallest altitude is below this part of its longest side."""
+"""A face is a sliver if its smallest altitude is below this part of its longest side, unless told
+otherwise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +43,13 @@ class WettedReport:
     cut: int
     """Faces that are no face of a component, but a part of one."""
     slivers: int
-    """Those among them whose smallest altitude is below `ALTITUDE` of their longest side."""
+    """Those among them whose smallest altitude is below `limit` of their longest side."""
     given_slivers: int
     """As many whole faces of the components, which are as they were given."""
     smallest_altitude: float
     """The least of those parts among the faces that were cut."""
+    limit: float = ALTITUDE
+    """Below which a face is a sliver."""
     notes: tuple[str, ...] = ()
     """What else was done or seen."""
 
@@ -72,8 +75,8 @@ class WettedReport:
             f"{self.area:.8g}, volume {self.volume:.8g}",
             f"formulas and boolean differ by {self.residual:.2g} at most",
             f"of {self.cut} faces that were cut {self.slivers} are slivers, of an altitude below "
-            f"{ALTITUDE:g} of the longest side (least {self.smallest_altitude:.2g}); of those that "
-            f"were not {self.given_slivers} are",
+            f"{self.limit:g} of the longest side (least {self.smallest_altitude:.2g}); of those "
+            f"that were not {self.given_slivers} are",
             *self.notes,
         ]
 
@@ -84,6 +87,7 @@ def reported(
     residual: float,
     is_cut: np.ndarray,
     axis: int | None,
+    limit: float,
     notes: tuple[str, ...],
 ) -> WettedReport:
     """Measure a wetted surface; `counts` are its points of each kind."""
@@ -114,9 +118,10 @@ def reported(
         pieces=pieces,
         residual=residual,
         cut=int(is_cut.sum()),
-        slivers=int(np.sum(shares[is_cut] < ALTITUDE)),
-        given_slivers=int(np.sum(shares[~is_cut] < ALTITUDE)),
+        slivers=int(np.sum(shares[is_cut] < limit)),
+        given_slivers=int(np.sum(shares[~is_cut] < limit)),
         smallest_altitude=float(shares[is_cut].min(initial=1.0)),
+        limit=limit,
         notes=notes,
     )
 

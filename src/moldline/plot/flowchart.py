@@ -86,7 +86,7 @@ def _box(axes: Axes, place: tuple[float, float], step: Entry, colour: str) -> No
     for number, text in enumerate(filter(None, rows)):
         short = text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
         weight = "normal" if number else "bold"
-        axes.text(x + 0.12, y + 0.42 - 0.25 * number, short, fontsize=9, weight=weight)
+        axes.text(x + 0.12, y + 0.44 - 0.22 * number, short, fontsize=9, weight=weight)
 
 
 def _wrapped(variables: tuple[str, ...]) -> list[str]:

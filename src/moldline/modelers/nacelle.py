@@ -202,7 +202,7 @@ class Nacelle(AbstractShape):
     def _faces(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Triangles, and for each 0, or 1 in the duct; a base is the cowl's."""
         side, rows = len(self.profile.stations), self.rows
-        number = np.arange(rows * self._row).reshape(rows, -1)
+        number = np.arange(rows * self._row, dtype=np.int32).reshape(rows, -1)
         upper = number[:, :side]
         rest = number[:, side:] if self.is_blunt else np.hstack([number[:, side:], upper[:, -1:]])
         lower = np.hstack([number[:, :1], rest[:, : side - 1]])

@@ -68,7 +68,7 @@ class RingLayout(eqx.Module):
         return _ring({name: value[row] for name, value in rows.items()}, share)
 
     def _starts(self) -> np.ndarray:
-        return np.cumsum([0, *(self.counts + 1)])
+        return np.cumsum([0, *(self.counts + 1)], dtype=np.int32)
 
     def _is_shared(self) -> np.ndarray:
         """Points at y = 0."""
@@ -83,10 +83,10 @@ class RingLayout(eqx.Module):
         breaks = np.flatnonzero(np.diff(counts)) + 1
         parts = []
         for own in np.split(np.arange(self.rows), breaks):
-            index = starts[own][:, None] + np.arange(counts[own[0]] + 1)
+            index = starts[own][:, None] + np.arange(counts[own[0]] + 1, dtype=np.int32)
             parts.append(between_rows(index, points)[:, ::-1])
         for k in breaks.tolist():
-            one, other = (np.arange(starts[r], starts[r + 1]) for r in (k - 1, k))
+            one, other = (np.arange(starts[r], starts[r + 1], dtype=np.int32) for r in (k - 1, k))
             parts.append(between_lines(one, other)[:, ::-1])
         faces = np.concatenate(parts)
         if not self.is_whole:

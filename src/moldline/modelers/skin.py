@@ -30,9 +30,8 @@ def between_rows(
     swaps = other < (1 - TIE) * one
     if edge is not None:
         swaps = (swaps | (edge[a] & edge[c])) & ~(edge[b] & edge[d])
-    first = np.stack([a, b, np.where(swaps, d, c)], axis=1)
-    second = np.stack([np.where(swaps, b, a), c, d], axis=1)
-    return without_repeats(np.stack([first, second], axis=1).reshape(-1, 3))
+    faces = np.stack([a, b, np.where(swaps, d, c), np.where(swaps, b, a), c, d], axis=1)
+    return without_repeats(faces.reshape(-1, 3))
 
 
 def between_lines(
@@ -60,7 +59,8 @@ def between_lines(
 def without_repeats(faces: Int[np.ndarray, "m 3"]) -> Int[np.ndarray, "_ 3"]:
     """Without triangles that have a point twice."""
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]
+    is_triangle = (a != b) & (b != c) & (c != a)
+    return faces if is_triangle.all() else faces[is_triangle]
 
 
 def mirrored(
@@ -70,7 +70,7 @@ def mirrored(
 
     Shared are the points that lie in the mirror; the others' images follow behind all points.
     """
-    image = np.arange(len(is_shared))
+    image = np.arange(len(is_shared), dtype=np.int32)
     moved = np.flatnonzero(~is_shared)
     image[moved] = len(is_shared) + np.arange(len(moved))
     return image[faces][:, ::-1], moved

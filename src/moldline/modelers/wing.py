@@ -284,8 +284,9 @@ class Wing(AbstractShape):
         faces, tags = self.layout.faces(points)
         faces = faces[:, ::-1] if self.along == "-y" else faces
         names = np.array([self.name, f"{self.name} tip", f"{self.name} root"])
-        used, tags = np.unique(tags, return_inverse=True)
-        return Surface(points, faces, tags, tuple(names[used].tolist()))
+        is_used = np.bincount(tags, minlength=3) > 0
+        tags = (np.cumsum(is_used) - 1)[tags]
+        return Surface(points, faces, tags, tuple(names[is_used].tolist()))
 
 
 def _leaning(name: str, angles: np.ndarray) -> np.ndarray:

@@ -104,15 +104,16 @@ class WingLayout(eqx.Module):
         The base runs from the upper to the lower side.
         """
         is_closed = self.tip == "closed"
-        number = np.arange((self.rows - is_closed) * self._row).reshape(-1, self._row)
+        number = np.arange((self.rows - is_closed) * self._row, dtype=np.int32)
+        number = number.reshape(-1, self._row)
         upper, rest = number[:, : self.side], number[:, self.side :]
         own = rest if self.is_blunt else np.concatenate([rest, upper[:, -1:]], axis=1)
         lower = np.concatenate([upper[:, :1], own[:, : self.side - 1]], axis=1)
         base = np.concatenate([upper[:, -1:], own[:, self.side - 1 :], lower[:, -1:]], axis=1)
         if is_closed:
-            edge = number.size + np.arange(self.side)
+            edge = number.size + np.arange(self.side, dtype=np.int32)
             upper, lower = np.vstack([upper, edge]), np.vstack([lower, edge])
-            base = np.vstack([base, np.full(base.shape[1], edge[-1])])
+            base = np.vstack([base, np.full(base.shape[1], edge[-1], np.int32)])
         return upper, lower, base
 
     def faces(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -142,7 +143,9 @@ class WingLayout(eqx.Module):
             columns, first = self._columns(self.root_edges, 0, first, True)
             parts += [between_lines(a, b) for a, b in _neighbours(columns)]
         faces = np.concatenate(parts)
-        tags = np.searchsorted(counts, np.arange(len(faces)), side="right").astype(np.int32)
+        tags = np.zeros(len(faces), np.int32)
+        for count in counts:
+            tags[count:] += 1
         if not self.is_whole:
             return faces, tags
         image, _ = mirrored(faces, self._is_shared(first))
@@ -155,8 +158,10 @@ class WingLayout(eqx.Module):
         upper, lower, base = self.sides()
         columns = []
         for a, b, count in zip(upper[row], lower[row], edges, strict=True):
-            inner = first + np.arange(count - 1)
-            columns.append(np.array([a]) if a == b else np.concatenate([[a], inner, [b]]))
+            inner = first + np.arange(count - 1, dtype=np.int32)
+            columns.append(
+                np.array([a]) if a == b else np.concatenate([[a], inner, [b]], dtype=np.int32)
+            )
             first += count - 1
         if is_flat:
             columns[-1] = base[row] if self.is_blunt else columns[-1]

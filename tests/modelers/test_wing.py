@@ -8,7 +8,7 @@ import pytest
 
 from moldline.case.options import model_of
 from moldline.errors import GeometryError, ParameterError
-from moldline.mesh import quality
+from moldline.mesh import quality, topology
 from moldline.mesh.health import health
 from moldline.mesh.planform import planform
 from moldline.modelers.airfoils import airfoil
@@ -96,6 +96,24 @@ def test_a_round_tip_is_half_a_body_of_revolution():
     added = quality.signed_volume(rounded) - quality.signed_volume(flat)
     np.testing.assert_allclose(added, np.pi / 2 * np.trapezoid(half**2, x), rtol=0.01)
     np.testing.assert_allclose(np.asarray(rounded.points)[:, 1].max(), 2.06, atol=1e-4)
+
+
+def test_a_round_tip_is_tangent_to_both_sides():
+    """What the triangles turn by at the tip's row halves with their size."""
+    turns = []
+    for fine in (33, 65):
+        wing = Wing(**SWEPT, airfoil="naca 2412", chordwise=fine, spanwise=fine)
+        surface = wing.geometry
+        near = topology.neighbours(surface.faces)
+        tags = np.asarray(surface.tags)
+        crosses = np.sort(np.stack([tags[near.one], tags[near.other]]), axis=0)
+        crosses = np.all(crosses == [[0], [1]], axis=0)
+        a, b, c = (np.asarray(surface.points)[np.asarray(surface.faces)[:, k]] for k in range(3))
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        cosine = np.sum(normals[near.one] * normals[near.other], axis=1)[crosses]
+        turns.append(np.median(np.arccos(cosine)))
+    np.testing.assert_allclose(turns[0] / turns[1], 2.0, atol=0.2)
 
 
 def test_a_closed_tip_thins_like_an_ellipse():

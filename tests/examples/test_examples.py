@@ -18,6 +18,11 @@ EXPECTED = {
     "ex05_airfoil_pilots": {"motion": 0.13138940769735713, "gradient": 0.5368939618560923},
     "ex06_wing_pilots": {"motion": 4.771970502704206, "gradient": 87.98363841941827},
     "ex07_wing_pipeline": {"uniform": (3 * np.pi / 16 - 2 / 15) / 6, "motion": 45.42548914823525},
+    "ex09_nacelle": {
+        "volume": 29.845239896020132,
+        "area": 176.64515636671058,
+        "reshaped": 0.5230196797989195,
+    },
 }
 CLAIMS = {
     "ex03_capsule_cage": {"decay": (0, 0.05)},  # of a cage vertex's effect with distance
@@ -43,6 +48,17 @@ CLAIMS = {
         "orders": (28, 40),  # by which the objective falls
         "off": (0, 1e-13),  # of a point from the hidden shape, by the root's chord
         "case": (0, 1e-15),
+    },
+    "ex09_nacelle": {
+        "genus": (1, 1),
+        "openings": (1, 1),  # at the plane of symmetry
+        "watertight": (1, 1),
+        "gap": (0, 1e-7),  # of volume's and area's derivatives, against new booleans
+        "ways": (0, 1e-12),
+        "anew": (4, 4),  # of four steps of 0.1 degrees
+        "anew_small": (0, 1),  # of four steps of 0.0001 degrees
+        "cage": (0, 1e-12),  # the shipped one against the generator's
+        "case": (0, 1e-14),
     },
 }
 """What numbers lie between."""

@@ -41,7 +41,7 @@ def check_coplanar(solids: Sequence[Solid], state: WettedState) -> None:
 
 def apart(solids: Sequence[Solid], state: WettedState) -> list[str]:
     """Sentences on components that cross no other, and whether they lie within another."""
-    joins, inside = state.joins(), state.encloses()
+    joins, inside = state.joins(), state.inside
     told: list[str] = []
     partners: set[frozenset[str]] = set()
     for k, one in enumerate(solids):
@@ -70,10 +70,11 @@ def grazing(solids: Sequence[Solid], state: WettedState, made: Provenance) -> li
     first = np.cumsum([0, *(len(s.points) for s in solids)])
     # the first end of an edge and the first corners of triangles are points of the inputs
     ends = np.concatenate([made.edges[:, [0, 2]].ravel(), made.triples[:, ::3].ravel()])
-    meets = np.isin(np.arange(len(solids)), np.searchsorted(first, ends, side="right") - 1)
+    numbers = np.arange(len(solids))
+    meets = np.isin(numbers, np.searchsorted(first, ends, side="right") - 1)
+    is_seen = np.isin(numbers, made.surface)
     told = []
-    for k in np.flatnonzero(~meets & state.joins().any(axis=1) & np.isin(
-        np.arange(len(solids)), made.surface)).tolist():  # fmt: skip
+    for k in np.flatnonzero(state.joins().any(axis=1) & ~meets & is_seen).tolist():
         _, other, place = _nearest(solids, k)
         told.append(
             f"{solids[k].name} touches {other} in a point or an edge only, near {_place(place)}"

@@ -8,7 +8,6 @@ from jaxtyping import Bool, Int
 from .._types import Array
 from ..mesh import topology
 from ..mesh.crossings import Crossings, Search
-from ..numerics.winding import winding
 from .solids import Plane, Solid
 
 
@@ -19,6 +18,10 @@ class WettedState:
     ----------
     crossings
         As they are bound.
+    free
+        Component and a point of each piece that crosses nothing.
+    inside
+        Whether each such piece lies in each component.
     """
 
     def __init__(self, solids: Sequence[Solid], plane: Plane | None):
@@ -29,8 +32,8 @@ class WettedState:
         edges = [s.plane_edges + at for s, at in zip(solids, self._first, strict=False)]
         self._search = Search(points, faces, plane.axis if plane else 1, edges)
         self.crossings = self._search(points)
-        self._free = self._free_points()
-        self._inside = self._enclosed([s.nodes for s in solids])
+        self.free = self._free_points()
+        self.inside = self._enclosed([s.nodes for s in solids])
 
     @property
     def faces(self) -> Int[np.ndarray, "m 3"]:
@@ -52,15 +55,6 @@ class WettedState:
         table[one, other] = table[other, one] = True
         return table
 
-    def encloses(self) -> Bool[np.ndarray, "f s"]:
-        """Whether each piece that crosses nothing lies in each component."""
-        return self._inside
-
-    @property
-    def free(self) -> tuple[tuple[int, int], ...]:
-        """Component and a point of each piece that crosses nothing."""
-        return self._free
-
     def holds(self, points: Sequence[Array]) -> bool:
         """Whether all crossings are the same, and what crosses nothing lies where it did."""
         moved = [np.array(p, float) for p in points]
@@ -77,7 +71,7 @@ class WettedState:
             np.concatenate([p, p[s.sources] + s.offset])
             for p, s in zip(moved, self._solids, strict=True)
         ]
-        return np.array_equal(self._enclosed(nodes), self._inside)
+        return np.array_equal(self._enclosed(nodes), self.inside)
 
     def _free_points(self) -> tuple[tuple[int, int], ...]:
         """A point of each piece that neither has an edge nor a face that crosses."""
@@ -94,8 +88,10 @@ class WettedState:
         return tuple(found)
 
     def _enclosed(self, nodes: Sequence[np.ndarray]) -> Bool[np.ndarray, "f s"]:
-        inside = np.zeros((len(self._free), len(self._solids)), bool)
-        for row, (k, point) in enumerate(self._free):
+        from ..numerics.winding import winding  # the compiler need not be loaded to read a file
+
+        inside = np.zeros((len(self.free), len(self._solids)), bool)
+        for row, (k, point) in enumerate(self.free):
             for other, solid in enumerate(self._solids):
                 if other != k:
                     around = winding(nodes[k][point][None], nodes[other], solid.all_faces)

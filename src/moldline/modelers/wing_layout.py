@@ -104,8 +104,8 @@ class WingLayout(eqx.Module):
         The base runs from the upper to the lower side.
         """
         is_closed = self.tip == "closed"
-        number = np.arange((self.rows - is_closed) * self._row, dtype=np.int32)
-        number = number.reshape(-1, self._row)
+        count = (self.rows - is_closed) * self._row
+        number = np.arange(count, dtype=np.int32).reshape(-1, self._row)
         upper, rest = number[:, : self.side], number[:, self.side :]
         own = rest if self.is_blunt else np.concatenate([rest, upper[:, -1:]], axis=1)
         lower = np.concatenate([upper[:, :1], own[:, : self.side - 1]], axis=1)

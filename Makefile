@@ -42,12 +42,14 @@ check: .venv/ready-dev  ## format, lint, types, layers, tests
 slow: .venv/ready  ## everything at full size
 	@$(BIN)/python -m pytest
 
-bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilots, files
+bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilots, modelers, unions, files
 	@$(BIN)/python benchmarks/deform.py
 	@$(BIN)/python benchmarks/embedding.py
 	@$(BIN)/python benchmarks/cage.py
 	@$(BIN)/python benchmarks/cage_errors.py
 	@$(BIN)/python benchmarks/pilots.py
+	@$(BIN)/python benchmarks/modelers.py
+	@$(BIN)/python benchmarks/union.py
 	@$(BIN)/python benchmarks/files.py
 
 docs: .venv/ready-dev  ## the documentation, into site/

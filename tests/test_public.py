@@ -11,7 +11,7 @@ PUBLIC = {
     "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
     "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle", "Pilots",
     "Pipeline", "Planform", "Section", "Skeleton", "Spot", "Stage", "Subdivision", "Surface",
-    "Tabulated", "Union", "Variable", "VolumeMesh", "Wing", "WingSkeleton", "airfoil", "errors",
+    "Tabulated", "TrapezoidalWing", "Union", "Variable", "VolumeMesh", "Wing", "WingSkeleton", "airfoil", "errors",
     "links", "load", "measures", "planform", "plot", "read", "read_sensitivities", "variable",
     "write", "write_sensitivities",
 }  # fmt: skip

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from .modelers.nacelle import Nacelle
     from .modelers.subdivision import Subdivision
     from .modelers.tabulated import Tabulated
+    from .modelers.trapezoidal_wing import TrapezoidalWing
     from .modelers.union import Union
     from .modelers.wing import Wing
     from .parameters import links
@@ -91,6 +92,7 @@ _HOMES = {
     "Subdivision": "modelers.subdivision",
     "Surface": "mesh",
     "Tabulated": "modelers.tabulated",
+    "TrapezoidalWing": "modelers.trapezoidal_wing",
     "Union": "modelers.union",
     "Variable": "parameters.variable",
     "VolumeMesh": "mesh",

@@ -1,0 +1,88 @@
+"""Full names of a document's values, and what a shorter name in it stands for."""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+
+from ..errors import ParameterError
+from ..mesh.io.text import quoted
+from .element import JOINT, Element
+from .vocabulary import VALUED, is_namespace
+
+
+def named(target: Element) -> Iterator[Element]:
+    """What has an ID and is read, below an element, in the order of the document.
+
+    Namespaces are looked into, values are not: what is within them has no name of its own.
+    """
+    waiting = [iter(target.children)]
+    while waiting:
+        element = next(waiting[-1], None)
+        if element is None:
+            waiting.pop()
+            continue
+        if element.id:
+            yield element
+        if is_namespace(element):
+            waiting.append(iter(element.children))
+
+
+def plain(name: str) -> str:
+    """A name without white space, which `dz[3, 1]` may hold."""
+    return re.sub(r"\s", "", name)
+
+
+class Names:
+    """Values by name: in full, by the last parts of it, or by ID alone."""
+
+    def __init__(self, elements: Iterable[Element]):
+        self._found: dict[str, list[Element]] = defaultdict(list)
+        for element in elements:
+            if element.tag not in VALUED:
+                continue
+            ending, endings = "", {plain(element.id)}
+            for one in (element, *element.ancestors()):
+                ending = plain(one.own_name) + (ending and JOINT + ending)
+                endings.add(ending)
+            for ending in endings:
+                self._found[ending].append(element)
+
+    def has(self, name: str) -> bool:
+        """Whether a name stands for anything, be it for several."""
+        return plain(name) in self._found
+
+    def find(self, name: str, scope: Element | None = None) -> Element | None:
+        """The value a name stands for, seen from `scope`; None if there is none.
+
+        Of several, the one with just this full name, else the one nearest: an ID of a brother
+        of what is in `scope`, then of what is around it.
+        """
+        found = self._found.get(plain(name), [])
+        if len(found) < 2:
+            return found[0] if found else None
+        exact = [one for one in found if plain(one.full_name) == plain(name)]
+        if exact:
+            return _only(exact, name)
+        around = [] if scope is None else [scope, *scope.ancestors()]
+        for place in around:
+            near = [one for one in found if _is_from(place, one, plain(name))]
+            if near:
+                return _only(near, name)
+        return _only(found, name)
+
+
+def _is_from(place: Element, element: Element, name: str) -> bool:
+    """Whether a name, read from a place, is the element's."""
+    if element.parent is place and plain(element.id) == name:
+        return True
+    return place in element.ancestors() and plain(element.name_below(place)) == name
+
+
+def _only(found: list[Element], name: str) -> Element:
+    if len(found) == 1:
+        return found[0]
+    each = ", ".join(f"{quoted(one.full_name)[1:-1]} (line {one.line})" for one in found[:4])
+    raise ParameterError(
+        f"{quoted(name)} may stand for {len(found)} values: {each}{', ...' * (len(found) > 4)}; "
+        f"use the full name, whose parts {JOINT!r} joins"
+    )

@@ -1,0 +1,1 @@
+"""SERVE: a running moldline, and the client that talks to it."""

@@ -1,0 +1,1 @@
+"""SHARE OUT: independent tasks to processes, or to other machines."""

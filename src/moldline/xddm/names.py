@@ -36,20 +36,26 @@ class Names:
     """Values by name: in full, by the last parts of it, or by ID alone."""
 
     def __init__(self, elements: Iterable[Element]):
-        self._found: dict[str, list[Element]] = defaultdict(list)
+        self._anywhere: dict[str, list[Element]] = defaultdict(list)
+        self._from: dict[tuple[Element | None, str], list[Element]] = defaultdict(list)
         for element in elements:
             if element.tag not in VALUED:
                 continue
-            ending, endings = "", {plain(element.id)}
-            for one in (element, *element.ancestors()):
-                ending = plain(one.own_name) + (ending and JOINT + ending)
-                endings.add(ending)
-            for ending in endings:
-                self._found[ending].append(element)
+            below: dict[tuple[Element | None, str], None] = {}
+            below[element.parent, plain(element.id)] = None
+            name = plain(element.own_name)
+            for place in element.ancestors():
+                below[place, name] = None
+                name = plain(place.own_name) + JOINT + name
+            below[None, name] = None  # in full
+            for place, ending in below:
+                self._from[place, ending].append(element)
+            for ending in dict.fromkeys(ending for _, ending in below):
+                self._anywhere[ending].append(element)
 
     def has(self, name: str) -> bool:
         """Whether a name stands for anything, be it for several."""
-        return plain(name) in self._found
+        return plain(name) in self._anywhere
 
     def find(self, name: str, scope: Element | None = None) -> Element | None:
         """The value a name stands for, seen from `scope`; None if there is none.
@@ -57,25 +63,15 @@ class Names:
         Of several, the one with just this full name, else the one nearest: an ID of a brother
         of what is in `scope`, then of what is around it.
         """
-        found = self._found.get(plain(name), [])
+        text = plain(name)
+        found = self._anywhere.get(text, [])
         if len(found) < 2:
             return found[0] if found else None
-        exact = [one for one in found if plain(one.full_name) == plain(name)]
-        if exact:
-            return _only(exact, name)
         around = [] if scope is None else [scope, *scope.ancestors()]
-        for place in around:
-            near = [one for one in found if _is_from(place, one, plain(name))]
-            if near:
+        for place in (None, *around):
+            if near := self._from.get((place, text)):
                 return _only(near, name)
         return _only(found, name)
-
-
-def _is_from(place: Element, element: Element, name: str) -> bool:
-    """Whether a name, read from a place, is the element's."""
-    if element.parent is place and plain(element.id) == name:
-        return True
-    return place in element.ancestors() and plain(element.name_below(place)) == name
 
 
 def _only(found: list[Element], name: str) -> Element:

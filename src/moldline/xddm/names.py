@@ -48,8 +48,8 @@ class Names:
                 below[place, name] = None
                 name = plain(place.own_name) + JOINT + name
             below[None, name] = None  # in full
-            for place, ending in below:
-                self._from[place, ending].append(element)
+            for key in below:
+                self._from[key].append(element)
             for ending in dict.fromkeys(ending for _, ending in below):
                 self._anywhere[ending].append(element)
 

@@ -88,7 +88,7 @@ def pipeline() -> ml.Pipeline:
         unit = units.get(name, "m" if name in ("span", "chord", "origin") else "")
         own = np.asarray(wing.values)[wing.parameters[name]]
         value = np.degrees(own).round(9) if unit == "deg" else own
-        variable = ml.variable(name, value=value, unit=unit, typical=OFF[name])
+        variable = ml.variable(name, value=value.tolist(), unit=unit, typical=OFF[name])
         links[variable] = ml.links.named(wing, name, absolute=True)
     count = sum(len(wing.parameters[name]) for name in sections)
     coefficients = ml.variable("sections", count, typical=OFF["sections"])

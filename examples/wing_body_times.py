@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -9,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 import moldline as ml
@@ -30,9 +32,9 @@ def exact(case: ml.Pipeline, design: Any, columns: Callable[..., Any]) -> dict[s
     made = here.branches["configuration"].making
     assert made is not None
     tried = {
-        "union": lambda: union.bind(*parts),
+        "union": lambda: union.bind(*parts).geometry.points,
         "union, moved parts": lambda: made(np.zeros(0), *(part.points for part in parts)),
-        "surface": lambda: np.asarray(here.points(design)),
+        "surface": lambda: here.points(design),
         "57 columns": lambda: columns(here, design),
         "pullback": lambda: here.pullback(design, shape),
     }
@@ -41,11 +43,11 @@ def exact(case: ml.Pipeline, design: Any, columns: Callable[..., Any]) -> dict[s
 
 def fastest(call: Callable[[], Any], times: int = 3) -> float:
     """Seconds of the fastest of several calls, after one that compiles."""
-    call()
+    jax.block_until_ready(call())
     found = []
     for _ in range(times):
         start = time.perf_counter()
-        call()
+        jax.block_until_ready(call())
         found.append(time.perf_counter() - start)
     return min(found)
 
@@ -86,12 +88,9 @@ def by_processes(
 
 def sized(text: str, sizes: Mapping[str, int]) -> str:
     """A case file with other numbers of points."""
-    lines = text.splitlines()
-    for place, line in enumerate(lines):
-        key = line.split(" = ")[0]
-        if key in sizes:
-            lines[place] = f"{key} = {sizes[key]}"
-    return "\n".join(lines) + "\n"
+    for key, count in sizes.items():
+        text = re.sub(rf"^{key} = \d+$", f"{key} = {count}", text, flags=re.MULTILINE)
+    return text
 
 
 def built(case: Path, values: Path, change: str) -> dict[str, Any]:

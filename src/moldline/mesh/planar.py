@@ -1,6 +1,7 @@
-"""Triangulation of plane outlines between their own points, none added and none left out."""
+"""Triangulation of plane outlines between given points, none added and none left out."""
 
 import heapq
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,11 @@ _TOUCHING = 1e-14
 
 
 def triangulated(
-    points: Float[np.ndarray, "n 2"], loops: list[Int[np.ndarray, "_"]]
+    points: Float[np.ndarray, "n 2"],
+    loops: list[Int[np.ndarray, "_"]],
+    inner: Sequence[int] = (),
 ) -> Int[np.ndarray, "m 3"]:
-    """Counter-clockwise triangles of the regions that loops enclose.
+    """Counter-clockwise triangles of the regions that loops enclose, with points inside of them.
 
     Outlines run counter-clockwise and holes clockwise, any number of both; none may cross itself or
     another. Points in a straight line are kept, so that neighbours fit edge by edge. Ears are cut
@@ -39,6 +42,8 @@ def triangulated(
         for outline, inside in zip(outlines, holes, strict=True)
         for triangle in _ears(points, _bridged(points, outline, inside))
     ]
+    for number in inner:
+        _split(points, faces, number)
     return _flipped(points, faces)
 
 
@@ -157,6 +162,18 @@ def _is_empty(
     p = corners[near[~np.isin(ids[near], ids[triangle])]]
     inside = [_cross(*side, p) >= -touching for side in ((a, b), (b, c), (c, a))]
     return not np.logical_and.reduce(inside).any()
+
+
+def _split(points: np.ndarray, faces: list[tuple[int, int, int]], number: int) -> None:
+    """Put a point into the triangle where it lies, which becomes three."""
+    corners = points[np.array(faces)]
+    sides = [_cross(corners[:, k - 1], corners[:, k], points[number]) for k in range(3)]
+    around = int(np.argmax(np.min(sides, axis=0)))
+    if min(side[around] for side in sides) < 0:
+        raise GeometryError(f"a point at {_place(points[number])} lies inside of no outline")
+    a, b, c = faces[around]
+    faces[around] = (a, b, number)
+    faces += [(b, c, number), (c, a, number)]
 
 
 def _flipped(points: np.ndarray, faces: list[tuple[int, int, int]]) -> Int[np.ndarray, "m 3"]:

@@ -102,9 +102,9 @@ def _examples():
 
 
 @pytest.mark.parametrize("path", list(_examples()))
-def test_an_example_gives_its_numbers(path, data):
+def test_an_example_gives_its_numbers(path, data, monkeypatch):
     if path.stem in NEEDS:
-        data(NEEDS[path.stem])
+        monkeypatch.setenv("MOLDLINE_DATA", str(data(NEEDS[path.stem]).parent))
     numbers = runpy.run_path(str(path))["main"]()
     order = numbers.pop("order", 2.0)
     for name, (low, high) in CLAIMS.get(path.stem, {}).items():

@@ -96,8 +96,8 @@ def found() -> Path:
     path = Path(os.environ.get("MOLDLINE_DATA", "")) / FILE
     if not path.exists():
         raise FileNotFoundError(
-            f"{path} is absent: it is no part of this project, but among pyGeo's test inputs; say in "
-            "the environment variable MOLDLINE_DATA which folder has it"
+            f"{path} is absent: it is no part of this project, but among pyGeo's test inputs; say "
+            "in the environment variable MOLDLINE_DATA which folder has it"
         )
     return path
 

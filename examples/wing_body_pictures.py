@@ -29,7 +29,7 @@ def draw(case: ml.Pipeline, design: Any, kept: Any, stations: Any, folder: Path)
         "wing_body_chart": ml.plot.of_pipeline(case, design, "A wing, a fuselage, what is wetted"),
     }
     for name, figure in figures.items():
-        ml.plot.save(figure, folder / f"{name}.png", dpi=90)
+        ml.plot.save(figure, folder / f"{name}.png", dpi=78)
     return [f"{name}.png" for name in figures]
 
 

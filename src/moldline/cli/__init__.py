@@ -11,7 +11,7 @@ from typing import Any
 
 COMMANDS = (
     "parameterise", "build", "deform", "sensitivity", "measure", "check", "info", "convert",
-    "plot", "schema",
+    "plot", "serve", "schema",
 )  # fmt: skip
 
 DESCRIPTION = """\

@@ -66,12 +66,17 @@ def full_name(design: Design, sensitivity: Element) -> str:
     return name if found is None else found.full_name
 
 
-def evaluated(design: Design, given: Mapping[str, Quantity] | None = None) -> dict[str, Quantity]:
+def evaluated(
+    design: Design,
+    given: Mapping[str, Quantity] | None = None,
+    waiting: list[str] | None = None,
+) -> dict[str, Quantity]:
     """Functions, Objectives, Constraints and Sums of a document, by full names.
 
     `given` holds, by full names, what the document does not say itself, such as results of other
     documents, and what is to be taken in place of what it says. An expression of something whose
-    derivatives nobody has computed has none either.
+    derivatives nobody has computed has none either. One of something that has no value yet is an
+    error; with `waiting` it is left out, and a sentence about it goes there.
     """
     known = quantities(design) | dict(given or {})
     foreign = {plain(name): name for name in given or {}}
@@ -84,6 +89,10 @@ def evaluated(design: Design, given: Mapping[str, Quantity] | None = None) -> di
             f"Expr: circular: {' -> '.join([*circle, circle[0]])}; let one of them name no other",
         )
     for name in order:
+        absent = links[name].absent(known)
+        if absent is not None and waiting is not None:
+            waiting.append(f"{name} waits for a Value of {absent}")
+            continue
         known[name] = found[name] = links[name].quantity(known)
     return found
 
@@ -105,6 +114,10 @@ class _Link:
         except ParameterError as problem:
             column = self.expression.column(name)
             self.design.document.refuse(self.value.element, f"Expr: column {column}: {problem}")
+
+    def absent(self, known: Mapping[str, Quantity]) -> str | None:
+        """The first of its names that has no value yet."""
+        return next((full for full in self.names.values() if full not in known), None)
 
     def quantity(self, known: Mapping[str, Quantity]) -> Quantity:
         for name, full in self.names.items():

@@ -8,7 +8,7 @@ from typing import NoReturn
 from ..errors import FileError
 from ..mesh.io.files import contents, replacing
 from . import reading
-from .edit import Draft, Edit, document_text
+from .edit import Draft, Edit, document_text, element_text
 from .element import Element
 from .numbers import number
 
@@ -53,6 +53,13 @@ class Document:
         edit = Edit()
         edit.set(element, attribute, value)
         return self.edited(edit)
+
+    def part(self, element: Element) -> "Document":
+        """A document of one element and all that is within it, in this one's words."""
+        text = element_text(self._source.text, element)
+        name = reading.PUBLIC.get(self._source.codec, self._source.codec.upper())
+        declared = f'<?xml version="1.0" encoding="{name}"?>\n'.encode()
+        return Document(self._source.encoded(declared + text + b"\n"), self.path)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it; the old file stays whole until the new one is."""

@@ -98,6 +98,11 @@ def document_text(draft: Draft, encoding: str) -> str:
     return f'<?xml version="1.0" encoding="{encoding}"?>\n{_text(draft, "", "  ", chr(10))}\n'
 
 
+def element_text(source: bytes, element: Element) -> bytes:
+    """The text of one element, from its first tag to its last."""
+    return source[element.start : _Layout(source).end(element)]
+
+
 class _Change(NamedTuple):
     start: int
     end: int

@@ -30,6 +30,12 @@ _MARKS = {
     codecs.BOM_UTF16_BE: "utf-16-be",
 }
 _KNOWN = ("utf-8", "iso8859-1", "iso8859-15", "ascii", "cp1252", "utf-16", "utf-16-le", "utf-16-be")
+PUBLIC = {
+    **{"iso8859-1": "ISO-8859-1", "iso8859-15": "ISO-8859-15", "cp1252": "windows-1252"},
+    **{"ascii": "US-ASCII", "utf-16-le": "UTF-16", "utf-16-be": "UTF-16"},
+}
+"""Encodings as declarations name them, where other programs may not know Python's name."""
+
 _DECLARED = re.compile(r"""<\?xml\s[^>]*?\sencoding\s*=\s*["']([^"'>]{0,60})["']""")
 _CUT_SHORT = {3, 5, 6, 20}  # expat: no element, unclosed token, part of a letter, unclosed CDATA
 

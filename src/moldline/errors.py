@@ -5,7 +5,8 @@ MoldlineError
 ├── FileError        a file that cannot be read or written: names file, place and cause
 ├── GeometryError    a geometry that cannot serve the purpose
 ├── ParameterError   a value, name or option that is not allowed
-└── CaseError        a case file that does not say what it must: names file and key
+├── CaseError        a case file that does not say what it must: names file and key
+└── TaskError        a task or a program that did not end as it must: names it and its last words
 ```
 """
 
@@ -28,3 +29,7 @@ class ParameterError(MoldlineError, ValueError):
 
 class CaseError(MoldlineError):
     """A case file does not say what it must."""
+
+
+class TaskError(MoldlineError):
+    """A task, or a program that was run, did not end as it must."""

@@ -92,7 +92,7 @@ def test_a_union_is_told_with_its_figures(folder, capsys):
     assert (
         main(["build", str(folder / "cross.toml"), "--set", "height=0.2", "-o", str(target)]) == 0
     )
-    assert "all was made anew: its parts cross in other places" in capsys.readouterr().out
+    assert "all was made anew: parts cross in other places" in capsys.readouterr().out
 
 
 def test_a_part_is_written_alone(folder, capsys):

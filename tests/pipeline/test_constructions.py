@@ -215,6 +215,52 @@ def test_a_union_that_no_longer_holds_is_made_anew_and_said_so(caplog):
         case.pullback(through, case.geometry.points)
 
 
+FIN = block([2.5, 0.3, 0.5], [0.5, 0.4, 2.0])
+
+
+@pytest.mark.parametrize("place", [[0.5, 0.3, 0.2], [0.0, -2.0, 0.0]])
+@pytest.mark.parametrize(
+    ("of", "modeler"), [(["pair"], ml.Subdivision(1)), (["pair", "fin"], ml.Union())]
+)
+def test_what_is_made_of_a_union_made_anew_is_made_anew_too(of, modeler, place):
+    case = ml.Pipeline(
+        {},
+        [
+            ml.Construction(BODY, to="body"),
+            ml.Construction(WING, {PLACE: links.named(WING, "place")}, to="wing"),
+            ml.Construction(FIN, to="fin"),
+            ml.Construction(ml.Union(), of=["body", "wing"], to="pair"),
+            ml.Construction(modeler, of=of, to="all"),
+        ],
+    )
+    values = {"place": place}
+    pair = case.of("pair")(values)
+    assert not np.array_equal(pair.faces, case.geometries["pair"].faces)
+    parts = [pair, *(case.geometries[name] for name in of[1:])]
+    expected, found = modeler.bind(*parts).geometry, case(values)
+    np.testing.assert_array_equal(found.faces, expected.faces)
+    np.testing.assert_allclose(found.points, expected.points, atol=1e-14)
+
+
+def test_pilots_on_a_union_are_refused_where_it_is_made_anew():
+    stages = [
+        ml.Construction(BODY, to="body"),
+        ml.Construction(WING, {PLACE: links.named(WING, "place")}, to="wing"),
+        ml.Construction(ml.Union(), of=["body", "wing"], to="all"),
+    ]
+    tip = ml.Spot.nearest(ml.Pipeline({}, stages).geometry, [2.1, 3.4, 0.5])
+    pilots = ml.Pilots(ml.Pipeline({}, stages).geometry, {"tip": tip})
+    lift = ml.variable("lift", size=3)
+    case = ml.Pipeline(
+        {}, [*stages, ml.Stage(pilots, {lift: links.named(pilots, "tip")}, on="all", name="tip")]
+    )
+    held = case({"place": [0.01, 0.0, 0.0], "lift": [0.0, 0.0, 0.1]})
+    place = ml.measures.Position(tip)(held.points)
+    np.testing.assert_allclose(place, [2.1, 3.4, 0.6], atol=1e-9)
+    with pytest.raises(GeometryError, match="'tip' holds points of 'all' by their numbers"):
+        case({"place": [0.0, -2.0, 0.0]})
+
+
 def test_a_union_that_no_longer_holds_is_an_error_where_values_are_traced(case):
     apart = {"place": jnp.array([0.0, -4.0, 0.0])}
     with pytest.raises(Exception, match="no longer cross where they did"):

@@ -6,11 +6,13 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import numpy as np
 
 from .._types import Array, Points
 from ..deformers.base import AbstractBinding
 from ..deformers.chain import plain
-from ..mesh import Geometry
+from ..errors import GeometryError
+from ..mesh import Geometry, Surface
 from ..modelers.base import AbstractMaking
 from .construction import Construction
 from .stage import Stage, Step
@@ -85,6 +87,13 @@ class Branch(eqx.Module):
 
     def remade(self, making: AbstractMaking) -> "Branch":
         """The same stages on what is made anew."""
+        asked = [stage.name for stage in self.stages if stage.settles]
+        if asked and not _same_faces(self.geometry, making.geometry):
+            raise GeometryError(
+                f"stage {asked[0]!r} holds points of {self.name!r} by their numbers, which is made "
+                "anew at these values, with other points: let it act on the parts, before they "
+                "are joined"
+            )
         return Branch(self.name, making.geometry, self.stages, self.construction, making)
 
     def source(self, full: Full, made: Sequence[Array]) -> Array:
@@ -188,3 +197,10 @@ class Branch(eqx.Module):
         return jax.jit(
             lambda full, rest, cotangent: jax.vjp(self.deformed, full, rest)[1](cotangent)
         )
+
+
+def _same_faces(one: Geometry, other: Geometry) -> bool:
+    """Whether the numbers of points mean the same in both."""
+    if not isinstance(one, Surface) or not isinstance(other, Surface):
+        return False
+    return np.array_equal(np.asarray(one.faces), np.asarray(other.faces))

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from ..mesh import Geometry, Surface, quality, topology
 from ..modelers.wetting import Wetting
 from .pipeline import Pipeline, Values
@@ -36,7 +38,7 @@ class Making:
             f"{key} {value:.8g}" if isinstance(value, float) else f"{value} {key}"
             for key, value in self.figures.items()
         ]
-        anew = [f"{name} was made anew: its parts cross in other places" for name in self.anew]
+        anew = [f"{name} was made anew: parts cross in other places" for name in self.anew]
         return [", ".join(figures), *anew, *self.told]
 
     def as_dict(self) -> dict[str, Any]:
@@ -70,3 +72,18 @@ def _figures(geometry: Geometry) -> dict[str, Any]:
     if len(topology.boundary_loops(geometry.faces)) == 0:
         found["volume"] = float(quality.signed_volume(geometry))
     return found
+
+
+def largest_motion(pipeline: Pipeline, values: Values | None = None) -> float:
+    """How far points move from where the variables' own values have them, at most [m].
+
+    Of what is made from other geometries, which may be made anew with other points, it is the
+    motion of these, and what its own stages do.
+    """
+    here, farthest = pipeline.at(values), 0.0
+    for name in here.feeding:
+        part = here.of(name)
+        start = part.source(values) if part.branches[part.leading].of else part.geometry.points
+        motion = np.asarray(part.points(values)) - np.asarray(start)
+        farthest = max(farthest, float(np.linalg.norm(motion, axis=1).max(initial=0.0)))
+    return farthest

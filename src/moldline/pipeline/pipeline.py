@@ -222,12 +222,13 @@ class Pipeline(eqx.Module):
         branches, states = dict(self.branches), {}
         for branch in self._feeders():
             made = [states[name] for name in branch.of]
-            if branch.making is not None and not branch.making.holds(*made):
+            is_other = any(branches[name] is not self.branches[name] for name in branch.of)
+            if branch.making is not None and (is_other or not branch.making.holds(*made)):
                 assert branch.construction is not None
                 inputs = [taken(branches[name], states[name]) for name in branch.of]
                 branch = branch.remade(branch.construction.bind(inputs))
                 branches[branch.name] = branch
-                log.info("%r is made anew: its parts cross in other places", branch.name)
+                log.info("%r is made anew: parts cross in other places", branch.name)
             states[branch.name] = branch.points(full, made)
         recent[:] = [self._with(branches, self.result)]
         return recent[0], states

@@ -15,7 +15,8 @@ EXAMPLE = """\
   moldline convert crm.xyz crm.tri --component wing=3-6,9-12,17,18 --cap y
   moldline convert wing.xyz wing.step --from-units m --tolerance 1e-4
   moldline convert flow.su2 wing.stl --marker WING
-  moldline convert inv_ONERAM6_ffd.cfg case.toml     (an SU2 case with FFD boxes)"""
+  moldline convert inv_ONERAM6_ffd.cfg case.toml     (an SU2 case with FFD boxes)
+  moldline convert case.toml model.xml               (a case as a Model of XDDM, and back)"""
 
 UNITS = ("m", "cm", "mm", "in", "ft")
 
@@ -56,6 +57,8 @@ def run(given: argparse.Namespace) -> int:
 
     if given.source.suffix.lower() == ".cfg":
         return _su2_case(given.source, given.target)
+    if given.source.suffix.lower() in (".toml", ".xml"):
+        return _document(given.source, given.target)
     target = named_by(given.target)
     if target.NAME == "STEP":
         return _step(given)
@@ -149,6 +152,33 @@ def _plane(text: str) -> tuple[str, float]:
         return plane, float(at or 0)
     except ValueError:
         raise ParameterError(f"--cap {text!r}: expected a place such as y=0.5") from None
+
+
+def _document(source: Path, target: Path) -> int:
+    """A case becomes a Model of XDDM, or a Model a case."""
+    from ..case import load
+    from ..errors import ParameterError
+    from ..xddm import document
+    from ..xddm.to_case import to_case
+    from ..xddm.to_model import to_model
+
+    kinds = source.suffix.lower(), target.suffix.lower()
+    if kinds == (".toml", ".xml"):
+        made = to_model(load(source), target)
+        made.document.save(target)
+        count, notes = len(made.document.by_name) - 1, made.notes
+    elif kinds == (".xml", ".toml"):
+        stated = to_case(document.read(source))
+        stated.save(target)
+        count = len(stated.tables.variable) + len(stated.tables.measure)
+        notes = stated.notes
+    else:
+        wanted = ".xml" if kinds[0] == ".toml" else ".toml"
+        raise ParameterError(f"{target}: from {source.name} a {wanted} file is made; name it so")
+    print(f"{target}: {count} variables, measures and bounds")
+    for note in notes:
+        print(f"  {note}")
+    return 0
 
 
 def _su2_case(source: Path, target: Path) -> int:

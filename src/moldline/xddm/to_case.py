@@ -21,7 +21,6 @@ from .measure_table import measure_table
 from .model import Design, Value
 from .upstream import is_inner
 
-
 WORDLESS = ("Function", "Objective", "Sum", "DesignPoint", "Intersect", "Tessellate", "AeroFun",
             "SensitivityArray", "Model")  # fmt: skip
 """Elements that a case cannot say."""
@@ -139,7 +138,8 @@ def _variable(
     if len(units) > 1:
         raise ParameterError(f"{name} has the units {', '.join(sorted(map(str, units)))}; give one")
     unit = next(iter(units), old.unit if old else "")
-    return variable(name, size, values.tolist(), bounds.tolist(), typical, str(unit).strip())
+    pairs = [(float(low), float(high)) for low, high in bounds]
+    return variable(name, size, values.tolist(), pairs, typical, str(unit).strip())
 
 
 def _table(one: Variable) -> dict[str, Any]:

@@ -46,6 +46,11 @@ def configure(command: argparse.ArgumentParser) -> None:
         help="let go of an unused case after (1800)",
     )
     command.add_argument(
+        "--no-spare",
+        action="store_true",
+        help="no process is kept ready for the next case: saves memory, costs seconds",
+    )
+    command.add_argument(
         "--quit-after", type=float, metavar="S", help="stop after so many seconds without a client"
     )
     command.add_argument(
@@ -78,7 +83,14 @@ def _serve(given: argparse.Namespace, ours: "socket.socket", where: dict[str, An
     from ..server.front import Front
 
     token = _token(given, is_needed=where.get("host", "127.0.0.1") not in listening.LOOPBACK)
-    front = Front(token, given.allow_shutdown, given.processes, given.idle, given.quit_after)
+    front = Front(
+        token,
+        given.allow_shutdown,
+        given.processes,
+        given.idle,
+        given.quit_after,
+        not given.no_spare,
+    )
     with listening.announced(given.ready, {**where, "token": token, "pid": os.getpid()}):
         print("serving at " + (where.get("socket") or "{host}, port {port}".format(**where)))
         print(end="", flush=True)

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from .holder import Spare
 from .process import CaseProcess
 from .protocol import ServerError
 
@@ -26,11 +27,14 @@ class Cases:
         Processes at the same time; where more are needed, one that is idle is stopped.
     idle
         Seconds after which a process that nobody asks anything is stopped.
+    spare
+        The next process.
     """
 
-    def __init__(self, most: int, idle: float):
+    def __init__(self, most: int, idle: float, spare: Spare):
         self.most = most
         self.idle = idle
+        self.spare = spare
         self._cases: dict[str, CaseProcess] = {}
         self._counter = itertools.count(1)
 
@@ -38,7 +42,7 @@ class Cases:
         """A new handle, and the case that it stands for."""
         key = await asyncio.to_thread(fingerprint, opening)
         if key not in self._cases:
-            self._cases[key] = CaseProcess(opening, self._admit)
+            self._cases[key] = CaseProcess(opening, self.spare, self._admit)
         case, handle = self._cases[key], f"case-{next(self._counter)}"
         case.handles.add(handle)
         return handle, case
@@ -52,7 +56,9 @@ class Cases:
         return list(self._cases.values())
 
     async def tidy(self) -> None:
-        """Stop what nobody has used for long."""
+        """Stop what nobody has used for long, and have the next process ready."""
+        if all(case.is_idle for case in self.each()):  # not while somebody waits
+            await self.spare.prepare()
         now = time.monotonic()
         for key, case in list(self._cases.items()):
             if case.is_idle and not case.handles and now - case.used > min(KEPT, self.idle):
@@ -63,7 +69,8 @@ class Cases:
 
     async def close(self) -> None:
         """End all processes."""
-        await asyncio.gather(*(case.close() for case in self._cases.values()))
+        ends = [self.spare.close(), *(case.close() for case in self._cases.values())]
+        await asyncio.gather(*ends)
         self._cases.clear()
 
     def _admit(self, newcomer: CaseProcess) -> None:

@@ -248,14 +248,15 @@ class Client:
 
     def _connect(self) -> None:
         path, host, port, token = self.address
-        if path is not None:
-            link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-            link.settimeout(self.timeout)
-            link.connect(path)
-        else:
+        if path is None:
             link = socket.create_connection((host, port or 0), self.timeout)
             link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        else:
+            link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
+            if path is not None:
+                link.settimeout(self.timeout)
+                link.connect(path)
             hello = {"id": 0, "op": "hello", "protocol": protocol.PROTOCOL, "token": token or ""}
             wire.send(link, protocol.encode(hello), self.timeout)
             told, _ = wire.receive(link, time.monotonic() + self.timeout)

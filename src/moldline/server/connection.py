@@ -119,7 +119,7 @@ class Connection:
         own[name](header)
 
     async def _open(self, header: dict[str, Any]) -> None:
-        kinds = ("path",) if "path" in header else ("text", "folder")
+        kinds: tuple[str, ...] = ("path",) if "path" in header else ("text", "folder")
         for kind in kinds:
             if not isinstance(header.get(kind), str):
                 raise ServerError("malformed", "'open' needs 'path', or 'text' and 'folder'")
@@ -127,9 +127,9 @@ class Connection:
         place = header[kinds[-1]]
         if not Path(place).is_absolute():
             raise ServerError("parameter", f"{place!r:.80}: give a full path, from the root")
-        handle, case = await self._front.cases.open({kind: header[kind] for kind in kinds})
+        handle, case = await self._front.cases.open({str(k): header[k] for k in kinds})
         self._cases[handle] = case
-        keep = {key: header[key] for key in ("id", "into") if key in header}
+        keep: dict[str, Any] = {key: header[key] for key in ("id", "into") if key in header}
         ask = {**keep, "op": "describe", "case": handle}
 
         def answer(told: dict[str, Any], pieces: list[Buffer]) -> None:

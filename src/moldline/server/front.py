@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from .cases import Cases
 from .connection import Connection
-from .process import WINDOW
+from .holder import WINDOW, Spare
 from .protocol import LARGEST_BODY
 
 TIDYING = 2.0
@@ -40,13 +40,14 @@ class Front:
         processes: int = 4,
         idle: float = 1800.0,
         quit_after: float | None = None,
+        spare: bool = True,
         largest: int = LARGEST_BODY,
     ):
         self.token = token
         self.may_shut_down = may_shut_down
         self.quit_after = quit_after
         self.largest = largest
-        self.cases = Cases(processes, idle)
+        self.cases = Cases(processes, idle, Spare(spare))
         try:
             self.version = version("moldline")
         except PackageNotFoundError:
@@ -63,6 +64,7 @@ class Front:
                 loop.add_signal_handler(number, self.stop)
         server = await asyncio.start_server(self._meet, sock=listening, limit=WINDOW)
         try:
+            await self.cases.spare.prepare()
             while not self._stopping.is_set():
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._stopping.wait(), TIDYING)

@@ -1,23 +1,15 @@
 """One case and the process that holds it, seen from the front process."""
 
 import asyncio
-import multiprocessing
-import signal
-import socket
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from . import protocol, worker
+from . import protocol
+from .holder import Holder, Spare
 from .protocol import Buffer, ServerError
-
-CONTEXT = multiprocessing.get_context("spawn")
-"""A fork of a process with threads, or with JAX, may hang."""
-
-WINDOW = 2**22
-"""Bytes that are read ahead of a link."""
 
 
 @dataclass(eq=False)
@@ -63,17 +55,19 @@ class CaseProcess:
         When it last answered, of `time.monotonic`.
     """
 
-    def __init__(self, opening: dict[str, Any], admit: Callable[["CaseProcess"], None]):
+    def __init__(
+        self, opening: dict[str, Any], spare: Spare, admit: Callable[["CaseProcess"], None]
+    ):
         self.opening = opening
         self.handles: set[str] = set()
         self.loads = 0
         self.used = time.monotonic()
+        self._spare = spare
         self._admit = admit
         self._waiting: deque[Job] = deque()
         self._now: Job | None = None
         self._wake = asyncio.Event()
-        self._process: Any = None
-        self._link: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+        self._holder: Holder | None = None
         self._task = asyncio.create_task(self._run())
 
     @property
@@ -84,7 +78,8 @@ class CaseProcess:
     @property
     def pid(self) -> int | None:
         """Of its process; None where there is none now."""
-        return self._process.pid if self._process is not None and self._process.is_alive() else None
+        alive = self._holder is not None and self._holder.is_alive
+        return self._holder.process.pid if self._holder is not None and alive else None
 
     def as_dict(self) -> dict[str, Any]:
         """For a client that asks what there is."""
@@ -116,21 +111,15 @@ class CaseProcess:
 
     def stop(self) -> None:
         """End the process; the next request starts another."""
-        if self._link is not None:
-            self._link[1].close()
-        if self._process is not None and self._process.is_alive():
-            self._process.terminate()
-        self._link = None
+        if self._holder is not None:
+            self._holder.stop()
+        self._holder = None
 
     async def close(self) -> None:
         """End the process for good, and wait until it is gone."""
         self._task.cancel()
-        self.stop()
-        if self._process is not None:
-            await asyncio.to_thread(self._process.join, 3)
-            if self._process.is_alive():
-                self._process.kill()
-                await asyncio.to_thread(self._process.join, 3)
+        if self._holder is not None:
+            await self._holder.close()
 
     async def _run(self) -> None:
         while True:
@@ -142,8 +131,8 @@ class CaseProcess:
                 self._now = None  # nobody is there to be told
                 continue
             try:
-                await self._ready()
-                job.answer(*await self._exchange(job))
+                holder = await self._ready()
+                job.answer(*await holder.exchange(job.header, job.pieces))
             except ServerError as error:
                 job.refuse(error)
             except OSError as error:
@@ -152,53 +141,18 @@ class CaseProcess:
                 )
             self._now, self.used = None, time.monotonic()
 
-    async def _ready(self) -> None:
+    async def _ready(self) -> Holder:
         """A process that has the case loaded."""
-        if self.pid is not None and self._link is not None and not self._link[0].at_eof():
-            return
+        if self._holder is not None and self._holder.is_alive:
+            return self._holder
         self.stop()
         self._admit(self)
-        ours, theirs = socket.socketpair()
-        with theirs:
-            self._process = CONTEXT.Process(target=worker.run, args=(theirs,), daemon=True)
-            self._process.start()
-        self._link = await asyncio.open_connection(sock=ours, limit=WINDOW)
-        header = {**self.opening, "op": "load"}
-        loading = Job(header, protocol.encode(header), self, lambda *_: None)
-        told, _ = await self._exchange(loading)
-        if not told.get("ok"):
-            self.stop()
-            raise ServerError(told["error"]["code"], told["error"]["message"])
-        self.loads += 1
-
-    async def _exchange(self, job: Job) -> tuple[dict[str, Any], list[Buffer]]:
-        assert self._link is not None
-        reader, writer = self._link
+        holder = self._holder = await self._spare.take()
         try:
-            for piece in job.pieces:
-                writer.write(piece)
-            await writer.drain()
-            if job.header.get("op") == "detach":
-                return {}, []
-            prefix = await reader.readexactly(protocol.PREFIX.size)
-            header, body = protocol.lengths(prefix)
-            text = await reader.readexactly(header)
-            pieces: list[Buffer] = [prefix + text]
-            if body:
-                pieces.append(await reader.readexactly(body))
-        except (OSError, asyncio.IncompleteReadError):
-            raise await self._death() from None
-        return protocol.parsed(text), pieces
-
-    async def _death(self) -> ServerError:
-        self.stop()
-        await asyncio.to_thread(self._process.join, 3)
-        code = self._process.exitcode
-        how = f"with status {code}"
-        if code is not None and code < 0:
-            how = f"by signal {-code} ({signal.Signals(-code).name})"
-        return ServerError(
-            "worker died",
-            f"the process that held the case ended {how} before it answered; the next request "
-            "loads the case again in a new one",
-        )
+            await holder.load(self.opening)
+        except ServerError:
+            self._holder = None
+            self._spare.give(holder)
+            raise
+        self.loads += 1
+        return holder

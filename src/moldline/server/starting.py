@@ -14,6 +14,9 @@ from typing import NamedTuple
 
 from .protocol import PROTOCOL, ServerError
 
+_STARTED: list[subprocess.Popen] = []
+"""Servers that go on when their client leaves; they are looked after for as long as we are here."""
+
 
 class Place(NamedTuple):
     """Where a server is, or is to be: its socket, or the file that tells its port."""
@@ -84,6 +87,7 @@ def start(place: Place, python: str | PathLike[str] | None, quit_after: float, w
             )
         except OSError as error:
             raise ServerError("disconnected", f"{program}: cannot be started: {error}") from None
+        _STARTED[:] = [server, *(one for one in _STARTED if one.poll() is None)]
         deadline = time.monotonic() + wait
         while not place.answers():
             if server.poll() is not None and not place.answers():

@@ -61,9 +61,11 @@ def run(link: socket.socket, cores: int | None = None) -> None:
             segments.drop(header["segments"])
             continue
         try:
-            if header.get("op") == "load":
+            answer = Message({}, {})
+            if header.get("op") == "warm":
+                _warm()
+            elif header.get("op") == "load":
                 held = _loaded(header)
-                answer = Message({}, {})
             else:
                 answer = _answer(held, header, body, segments)
             pieces = _encoded(header, answer, segments)
@@ -73,6 +75,17 @@ def run(link: socket.socket, cores: int | None = None) -> None:
             wire.send(link, pieces)
         except OSError:
             return
+
+
+def _warm() -> None:
+    """Import what every case needs, which takes longer than to load most of them."""
+    import threading
+
+    os.environ.setdefault("TQDM_DISABLE", "1")  # nobody looks at a bar here
+    import tqdm
+
+    tqdm.tqdm.set_lock(threading.RLock())  # a killed process would leave its own one behind
+    from . import operations  # noqa: F401
 
 
 def _loaded(header: dict[str, Any]) -> "Held":

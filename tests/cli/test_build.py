@@ -149,6 +149,20 @@ def test_what_is_wrong_is_named_with_its_place(folder, tmp_path, old, new, messa
         ml.load(tmp_path / "case.toml")
 
 
+def test_half_a_model_is_sound_and_its_components_have_the_geometries_names(capsys):
+    case = str(ROOT / "examples/wing_body.toml")
+    assert main(["check", case]) == 0
+    told = capsys.readouterr().out
+    assert "half a model: closed at y = 0 for what follows" in told
+    assert "components: wing, wing tip, fuselage, symmetry plane" in told
+
+
+def test_deform_tells_how_far_the_parts_of_a_union_move(folder, capsys):
+    target = str(folder / "new.tri")
+    assert main(["deform", str(folder / "cross.toml"), "--set", "height=0.3", "-o", target]) == 0
+    assert "moved by up to 0.3," in capsys.readouterr().out
+
+
 def test_a_case_that_makes_its_geometry_is_not_streamed(folder, capsys):
     assert main(["deform", str(folder / "cross.toml"), "--stream", "-o", "x.tri"]) == 1
     assert "a case that makes its geometry has no file to stream" in capsys.readouterr().err

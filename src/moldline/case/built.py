@@ -28,6 +28,8 @@ def modeler(file: str, where: str, table: Any) -> AbstractModeler:
         given = schema.checked(
             options.of_class(table.modeler, cls), table.model_extra or {}, file, where
         )
+        if "name" in cls.options():
+            given["name"] = table.to  # the key itself is the stage's name
         return cls.build(Path(file).parent, **given)
     except MoldlineError as error:
         if isinstance(error, CaseError):

@@ -48,6 +48,7 @@ def run(given: argparse.Namespace) -> int:
     from ..case import load
     from ..errors import ParameterError
     from ..mesh.io import read
+    from ..pipeline import examine
 
     if given.weld is not None and given.fix is None:
         raise ParameterError("--weld belongs to --fix OUT, which says where to write")
@@ -60,7 +61,10 @@ def run(given: argparse.Namespace) -> int:
         raise ParameterError("--fix mends a geometry file, not a case; give the geometry's file")
     case = load(given.case)
     chosen = values.chosen(case, given)
-    mesh, mesh_lines, is_mesh_sound = _mesh(case.pipeline.geometry, given)
+    rest, plane = examine.at_rest(case.pipeline)
+    mesh, mesh_lines, is_mesh_sound = _mesh(rest, given)
+    if plane is not None:
+        mesh_lines.insert(1, f"  half a model: closed at {plane} = 0 for what follows")
     moved, moved_lines, is_moved_sound = _deformation(case.pipeline, chosen)
     is_sound = is_mesh_sound and is_moved_sound
     show(

@@ -35,13 +35,12 @@ def run(given: argparse.Namespace) -> int:
     """Do it; 0 only if pilots, where there are some, hold what they are asked for."""
     import time
 
-    import numpy as np
-
     from ..case import load
     from ..errors import ParameterError
     from ..mesh.io import write
     from ..pipeline import examine
     from ..pipeline.holding import holding
+    from ..pipeline.making import largest_motion
 
     case = load(given.case, sampled=given.stream)
     chosen = values.chosen(case, given)
@@ -56,13 +55,10 @@ def run(given: argparse.Namespace) -> int:
     shape = pipeline(chosen)
     seconds = time.perf_counter() - start
     write(target, shape, units=case.units(given.rider))
-    here = pipeline.at(chosen)
-    is_joined = len(here.feeding) > 1
-    rest = np.asarray(here.source(chosen) if is_joined else pipeline.geometry.points)
-    moved = float(np.linalg.norm(np.asarray(shape.points) - rest, axis=1).max())
+    moved = largest_motion(pipeline, chosen)
     torn, held = examine.tears(pipeline, chosen), holding(pipeline, chosen)
     report = {
-        "points": len(rest),
+        "points": len(shape.points),
         "largest_motion": moved,
         "seconds": seconds,
         "file": str(target),
@@ -70,7 +66,8 @@ def run(given: argparse.Namespace) -> int:
         "pilots": [one.as_dict() for one in held],
     }
     lines = [
-        f"{target}: {len(rest)} points, moved by up to {moved:.6g}, in {1e3 * seconds:.2f} ms",
+        f"{target}: {len(shape.points)} points, moved by up to {moved:.6g}, "
+        f"in {1e3 * seconds:.2f} ms",
         *map(str, torn),
         *(line for one in held for line in one.sentences()),
     ]

@@ -82,8 +82,8 @@ class Variable:
 def variable(
     name: str,
     size: int | None = None,
-    value: float | Sequence[float] = 0.0,
-    bounds: tuple[float, float] | Sequence[tuple[float, float]] = (-math.inf, math.inf),
+    value: float | Sequence[float] | Array = 0.0,
+    bounds: tuple[float, float] | Sequence[tuple[float, float]] | Array = (-math.inf, math.inf),
     typical: float | None = None,
     unit: str = "",
 ) -> Variable:

@@ -81,7 +81,8 @@ class Assembly:
     def _construct(self, stage: Construction) -> None:
         if "/" in stage.to or stage.to in self._sources:
             raise ParameterError(
-                f"stage {stage.name!r}: to = {stage.to!r} is another geometry's name, or has a slash"
+                f"stage {stage.name!r}: to = {stage.to!r} is another geometry's name, "
+                "or has a slash"
             )
         for name in stage.of:
             check_name(name, self.names)

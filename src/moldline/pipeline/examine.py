@@ -10,8 +10,10 @@ from ..deformers.base import map_slopes
 from ..deformers.control_volume import ControlVolume
 from ..deformers.foreign import AbstractNumpyDeformer
 from ..deformers.net import AbstractControlNet
-from ..mesh import Surface, VolumeMesh, quality
+from ..mesh import Geometry, Surface, VolumeMesh, quality, topology
+from ..mesh.cap import capped
 from ..mesh.joined import joined_points
+from ..modelers.union import Union
 from ..numerics import taylor
 from ..numerics.taylor import Remainder, remainder
 from .pipeline import Pipeline, Values
@@ -122,6 +124,18 @@ class Proof:
     def is_right(self) -> bool:
         """Whether both derivatives are proved."""
         return self.forward.is_right and self.mismatch < 1e-6
+
+
+def at_rest(pipeline: Pipeline) -> tuple[Geometry, str | None]:
+    """The result before its stages, whose mesh is to be sound; and what closes it, if anything.
+
+    Half a model that a union left open in its plane of symmetry is closed there.
+    """
+    geometry, made = pipeline.geometry, pipeline.branches[pipeline.result].construction
+    plane = made.modeler.symmetry if made and isinstance(made.modeler, Union) else None
+    if plane is None or not isinstance(geometry, Surface) or topology.is_closed(geometry.faces):
+        return geometry, None
+    return capped(geometry, "symmetry plane", plane)[0], plane
 
 
 def folding(pipeline: Pipeline, values: Values | None = None) -> Folding:

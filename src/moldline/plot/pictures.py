@@ -12,6 +12,7 @@ from ..deformers.pilots import Pilots
 from ..errors import ParameterError
 from ..mesh import Cloud, Geometry, Section, Surface, VolumeMesh
 from ..mesh.joined import joined_points
+from ..modelers.wetting import Wetting
 from ..pipeline.pipeline import Pipeline, Values
 from ..pipeline.stage import Step
 from .figure import blank
@@ -79,13 +80,14 @@ def of_sensitivity(
     direction = {name: np.eye(variable.size)[index]}
     pipeline = pipeline.at(values)
     motion = np.asarray(pipeline.pushforward(values, direction))
-    axis = int(np.abs(motion).max(axis=0).argmax())
+    own = np.abs(motion[: _own_points(pipeline)]).max(axis=0)
+    axis = int(own.argmax())
     unit = f" per {variable.unit}" if variable.unit else ""
     label = f"d{'xyz'[axis]} / d {variable.labels()[index]}{unit and ' [m' + unit + ']'}"
     return sensitivity_map(
         pipeline.points(values),
         _faces(pipeline),
-        motion[:, axis],
+        np.clip(motion[:, axis], -own[axis], own[axis]),
         label,
         nets(pipeline, values),
         _highlighted(pipeline, values, direction),
@@ -100,6 +102,14 @@ def of_cuts(pipeline: Pipeline, values: Values | None, stations: Sequence[float]
     rest = here.source(values) if is_joined else here.geometry.points
     moved = np.asarray(here.points(values))
     return section_picture(rest, moved, _faces(here), stations)
+
+
+def _own_points(pipeline: Pipeline) -> int:
+    """How many points move as their part does; where a union's cut is flat, others run fast."""
+    made = pipeline.branches[pipeline.result].making
+    if isinstance(made, Wetting):
+        return sum(len(part) for part in made.recipe.kept)
+    return len(pipeline.geometry.points)
 
 
 def _mesh_lines(mesh: VolumeMesh) -> np.ndarray:

@@ -89,18 +89,27 @@ def test_nothing_is_differenced_that_nobody_asks_for(ask, tmp_path):
     assert len((tmp_path / "runs.txt").read_text().splitlines()) == 1
     assert "SensitivityArray" not in (tmp_path / "model.output.xml").read_text()
     assert ml.read(tmp_path / "Components.i.tri").point_data == {}
-    ask(more=lambda text: text.replace('TypicalSize="1"', 'Sensitivity="None"').replace(
-        "  <Configure", "  <!--").replace("-->", "").replace('<Analysis ID="size"',
-        '--><Analysis Sensitivity="required" ID="size"'))  # fmt: skip
+
+
+def test_one_result_may_ask_and_one_variable_may_decline(ask, tmp_path):
+    def local(text):
+        text = text.replace('<Configure Sensitivity="Required"/>', "")
+        text = text.replace('ID="size"', 'ID="size" Sensitivity="required"')
+        return text.replace('ID="t[1,2]"', 'ID="t[1,2]" sensitivity="None"')
+
+    found = ask(more=local)
+    assert [*found.results["Model__m__Analysis__size"].gradient] == ["Model__m__Variable__w"]
+    assert len((tmp_path / "runs.txt").read_text().splitlines()) == 3
+    assert (tmp_path / "model.output.xml").read_text().count("<SensitivityArray>") == 1
 
 
 @pytest.mark.parametrize(
     ("mode", "error", "message"),
     [
-        (1, FileError, r"w = 0.5 [+-]0.0001: .*(plus|minus)_0.0001: .*ended with status 3, expected "
+        (1, FileError, r"w = 0.5 [+-]0.0001: .*(plus|minus)_0.0001: .*status 3, expected "
             r"0; its log wrapper.log ends:\n  \| making it\n  \| \?\[31mred\n  \| no such width"),
         (2, FileError, r"base: .*took more than 0.3 s; its log"),
-        (3, GeometryError, r"w = 0.5 .*has 4 points and 3 triangles, at the base there are 4 and 4"),
+        (3, GeometryError, r"w = 0.5 .*4 points and 3 triangles, at the base there are 4 and 4"),
         (4, GeometryError, r"w = 0.5 .*joins 2 of its 4 triangles otherwise than at the base"),
         (5, FileError, r"left no Components.i.tri"),
     ],

@@ -17,10 +17,9 @@ Operation: TypeAlias = Callable[[Held, Message], Message]
 
 def describe(held: Held, ask: Message) -> Message:
     """All that does not change with the values, and the result's points at rest and triangles."""
-    told = description.of_case(held.case)
     shape = geometry(held, ask)
-    fields = {**told, "case": ask.header.get("case"), "connectivity": shape.header["connectivity"]}
-    return Message(fields, shape.arrays)
+    own = {"case": ask.header.get("case")}
+    return Message({**description.of_case(held.case), **shape.header, **own}, shape.arrays)
 
 
 def geometry(held: Held, ask: Message) -> Message:

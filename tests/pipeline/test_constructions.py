@@ -148,6 +148,22 @@ def test_a_carried_stage_is_carried_from_where_the_modeler_begins():
     np.testing.assert_allclose(case(values).points, rest + one + other, atol=1e-14)
 
 
+def test_a_stage_that_refuses_points_refuses_those_of_a_modeler_too():
+    around = block([-0.5, -0.5, -0.5], [5, 2, 2]).geometry
+    cage = ml.Cage.of(around, cells=8)
+    lift = ml.variable("lift")
+    stage = ml.Stage(cage, {lift: links.group(cage, "z", index=[[1]])})
+    long = ml.variable("length", value=6.0)
+    for variable, fits in ((LENGTH, True), (long, False)):
+        own = links.named(BODY, "sides", [0], absolute=True)
+        stages = [ml.Construction(BODY, {variable: own}), stage]
+        if fits:
+            ml.Pipeline({}, stages)
+            continue
+        with pytest.raises(GeometryError, match="stage 'cage' on 'geometry': 4 of 8 points"):
+            ml.Pipeline({}, stages)
+
+
 def test_a_union_in_the_middle_has_the_exact_volume(case):
     found = case({"bend": np.zeros(3), "bulge": np.zeros(2)})
     assert topology.is_closed(found.faces)

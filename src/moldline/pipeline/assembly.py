@@ -105,9 +105,11 @@ class Assembly:
             leader = None if base == name else self._branch(base)
             if leader is not None:
                 check_rides(name, leader)
-            self._done[name] = Branch(
+            branch = self._done[name] = Branch(
                 name, source.geometry, self._on[base], source.construction, source.making, leader
             )
+            if branch.stages and not branch.is_fixed:  # what it refuses, it refuses here
+                branch.stages[0].bind(name, source.geometry.points)
             for other in source.of:
                 self._branch(other)
         return self._done[name]

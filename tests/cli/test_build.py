@@ -95,6 +95,23 @@ def test_a_union_is_told_with_its_figures(folder, capsys):
     assert "all was made anew: parts cross in other places" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ('{"sweep": "abc"}', "sweep must be a number or a list of them, got 'abc'"),
+        ('{"sweep": null}', "sweep must be a number or a list of them, got None"),
+        ('{"sweep": [[1], [2, 3]]}', "sweep must be a number or a list of them"),
+        ('{"sweep": 30}', "'sweep' has 2 numbers, got [30]"),
+    ],
+)
+def test_values_of_a_file_that_are_no_numbers_are_told(tmp_path, capsys, said, message):
+    values = tmp_path / "values.json"
+    values.write_text(said)
+    asked = ["--values", str(values), "--set", "sweep[1]=25", "-o", str(tmp_path / "wing.tri")]
+    assert main(["build", str(WING), *asked]) == 1
+    assert message in capsys.readouterr().err
+
+
 def test_a_part_is_written_alone(folder, capsys):
     target = folder / "wing.stl"
     case = str(folder / "cross.toml")

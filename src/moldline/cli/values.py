@@ -49,7 +49,10 @@ def chosen(case: "Case", given: argparse.Namespace) -> dict[str, Any]:
         if name not in own or index >= own[name].size or len(given_numbers) != 1:
             size = own[name].size if name in own else 0
             raise _problem(f"--set {text}: {name!r} has {size} numbers, counted from 0")
-        present = list(changes.get(name, own[name].value))
+        present = changes.get(name, own[name].value)
+        present = [present] if isinstance(present, float | int) else list(present)
+        if index >= len(present):
+            raise _problem(f"{given.values}: {name!r} has {own[name].size} numbers, got {present}")
         present[index] = given_numbers[0]
         changes[name] = present
     return case.values(changes)
@@ -77,6 +80,10 @@ def _from_file(path: Path) -> dict[str, Any]:
         raise _problem(f"{path}: cannot be read as JSON: {error}") from None
     if not isinstance(found, dict):
         raise _problem(f"{path}: expected an object of values by name, got {found!r:.40}")
+    for name, value in found.items():
+        each = value if isinstance(value, list) else [value]
+        if not all(isinstance(one, float | int) for one in each):
+            raise _problem(f"{path}: {name} must be a number or a list of them, got {value!r:.40}")
     return found
 
 

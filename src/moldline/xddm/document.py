@@ -55,10 +55,11 @@ class Document:
         return self.edited(edit)
 
     def part(self, element: Element) -> "Document":
-        """A document of one element and all that is within it, in this one's words."""
+        """A document of one element and all that is within it, in this one's words and lines."""
         text = element_text(self._source.text, element)
         name = reading.PUBLIC.get(self._source.codec, self._source.codec.upper())
         declared = f'<?xml version="1.0" encoding="{name}"?>\n'.encode()
+        declared += b"\n" * (element.line - 2)
         return Document(self._source.encoded(declared + text + b"\n"), self.path)
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -284,6 +284,9 @@ class Client:
             ) from None
         except (OSError, ServerError) as error:
             raise self._lost(error) from None
+        except BaseException:  # interrupted within a frame: where the next one begins is not known
+            self.close()
+            raise
         number = header.get("id")
         problem = wire.problem_of(header)
         if number not in self._under_way:

@@ -48,6 +48,7 @@ class Holder:
         reader, writer = await asyncio.open_connection(sock=ours, limit=WINDOW)
         self = cls(process, reader, writer)
         self._warming = asyncio.create_task(self.exchange(*_framed({"op": "warm"})))
+        self._warming.add_done_callback(lambda task: task.cancelled() or task.exception())
         return self
 
     @property

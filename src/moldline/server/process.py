@@ -135,10 +135,10 @@ class CaseProcess:
                 job.answer(*await holder.exchange(job.header, job.pieces))
             except ServerError as error:
                 job.refuse(error)
-            except OSError as error:
-                job.refuse(
-                    ServerError("internal", f"the case's process cannot be started: {error}")
-                )
+            except Exception as error:  # whatever it is, the next request is served
+                self.stop()
+                told = f"the case's process cannot be used: {type(error).__name__}: {error}"
+                job.refuse(ServerError("internal", told))
             self._now, self.used = None, time.monotonic()
 
     async def _ready(self) -> Holder:

@@ -58,12 +58,22 @@ def relocated(value: Any, folder: Path) -> Any:
     if not isinstance(value, dict):
         return value
     if "modeler" in value:
-        return {key: _sections(one, folder) for key, one in value.items()}
+        own = options.paths(registry.modeler(value["modeler"]))
+        return {
+            key: _placed(one, folder) if key in own else one if own else _sections(one, folder)
+            for key, one in value.items()
+        }
     names = _paths(value)
     return {
         key: str((folder / one).resolve()) if key in names else relocated(one, folder)
         for key, one in value.items()
     }
+
+
+def _placed(value: Any, folder: Path) -> Any:
+    if isinstance(value, list):
+        return [_placed(one, folder) for one in value]
+    return str((folder / value).resolve())
 
 
 def _sections(value: Any, folder: Path) -> Any:

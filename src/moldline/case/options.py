@@ -65,7 +65,8 @@ def of_class(name: str, cls: Kind) -> type[BaseModel]:
 
 def paths(cls: Kind) -> dict[str, Any]:
     """Options that are paths, and what they are where a case file does not say."""
-    found = {k: o for k, o in cls.options().items() if o.annotation in (Path, Path | None)}
+    kinds = (Path, Path | None, list[Path] | None)
+    found = {k: o for k, o in cls.options().items() if o.annotation in kinds}
     return {k: o.default for k, o in found.items()}
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from typing_extensions import override
@@ -30,6 +31,21 @@ class AbstractMaking(eqx.Module):
     def __call__(self, parameters: Vector, *points: Array) -> Array:
         """Points of `geometry` for other parameters and moved points; JAX differentiates it."""
 
+    @property
+    def is_foreign(self) -> bool:
+        """Whether it is no JAX inside: not compiled, and differentiated by directions."""
+        return False
+
+    def along(
+        self,
+        parameters: Vector,
+        points: Sequence[Array],
+        changes: Sequence[tuple[Vector, Sequence[Array]]],
+    ) -> list[Array]:
+        """Motions of its points for several changes of the parameters and of those points."""
+        given = (parameters, *points)
+        return [jax.jvp(self, given, (change, *moves))[1] for change, moves in changes]
+
     def holds(self, *points: Array) -> bool:
         """Whether the same connectivity is still right for moved points; concrete ones only."""
         return True
@@ -52,6 +68,9 @@ class AbstractModeler(eqx.Module):
     def size(self) -> int:
         """Number of parameters."""
         return len(self.values)
+
+    def check(self, parameters: Vector) -> None:
+        """Raise ParameterError for parameters that it would refuse as values of its own."""
 
     @property
     @abc.abstractmethod

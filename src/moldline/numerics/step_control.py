@@ -33,6 +33,8 @@ class Line:
         A step along it that matters, in units of the direction.
     below, above
         How far it may go back and on.
+    group
+        Lines of one group share what is measured along the first of them.
     """
 
     name: str
@@ -40,6 +42,12 @@ class Line:
     trial: float
     below: float = float("inf")
     above: float = float("inf")
+    group: str = ""
+
+    @property
+    def known_as(self) -> str:
+        """What is measured along it is kept by this."""
+        return self.group or self.name
 
 
 class Probe(NamedTuple):
@@ -99,8 +107,11 @@ class StepControl:
     def slopes(self, evaluate: Evaluate, start: Array, lines: Sequence[Line]) -> list[Slope]:
         """Derivatives along lines; `start` is the value where they begin."""
         origin = np.asarray(start, float)
-        new = [line for line in lines if line.name not in self._known and not self.is_fixed]
-        done = self._measure(evaluate, origin, new) if new else {}
+        new: dict[str, Line] = {}
+        for line in lines:
+            if line.known_as not in self._known and not self.is_fixed:
+                new.setdefault(line.known_as, line)
+        done = self._measure(evaluate, origin, list(new.values())) if new else {}
         rest = [line for line in lines if line.name not in done]
         probes = [
             Probe(line, offset * self._step(line))
@@ -139,7 +150,7 @@ class StepControl:
             best = (self.noise / (rule.truncation * third)) ** (1 / 3)
             step = float(np.clip(best, SMALLEST * size, size))
             is_near = step >= NEAR * size
-            self._known[line.name] = (size if is_near else step, float(third))
+            self._known[line.known_as] = (size if is_near else step, float(third))
             if is_near:
                 near = dict(zip((0, *rule.trials), own, strict=True))
                 own = [near[k] for k in (0, *rule.offsets)]
@@ -150,13 +161,13 @@ class StepControl:
         rule = _rule(line)
         sign = 1.0 if rule is _CENTRAL or line.above >= line.below else -1.0
         column = sign * _weighted(rule.slope, values) / step
-        if self.noise is None or line.name not in self._known:
+        if self.noise is None or line.known_as not in self._known:
             return Slope(column, step, float("nan"))
-        third = self._known[line.name][1]
+        third = self._known[line.known_as][1]
         return Slope(column, step, 2 * self.noise / step + rule.truncation * third * step**2)
 
     def _step(self, line: Line) -> float:
-        return min(self._known.get(line.name, (np.inf, 0.0))[0], _trial(line))
+        return min(self._known.get(line.known_as, (np.inf, 0.0))[0], _trial(line))
 
 
 def _rule(line: Line) -> _Rule:

@@ -6,6 +6,7 @@ from typing import Any
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from .._types import Array, Points
@@ -74,6 +75,18 @@ class Branch(eqx.Module):
     def is_fixed(self) -> bool:
         """Whether the points stay where they are before the first stage."""
         return self.construction is None or self.construction.is_fixed
+
+    @property
+    def is_foreign(self) -> bool:
+        """Whether another program makes it: then it is differentiated by directions."""
+        return self.making is not None and self.making.is_foreign
+
+    @property
+    def turned_by(self) -> set[str]:
+        """Names of the variables of its own."""
+        made = {} if self.construction is None else self.construction.links
+        links = [made, *(stage.links for stage in self.stages)]
+        return {variable.name for own in links for variable in own}
 
     @property
     def of(self) -> tuple[str, ...]:
@@ -152,10 +165,56 @@ class Branch(eqx.Module):
         self, full: Full, change: Full, made: Sequence[Array], moves: Sequence[Array]
     ) -> tuple[Array, Array]:
         """Points, and their motion for a change of the values and of what they are made from."""
-        if not self.of:
+        if self.is_foreign:
+            rest = self.source(full, made)
+            (motion,) = self.source_motions(full, [change], made, [moves])
+        elif self.of:
+            rest, motion = jax.jvp(self.source, (full, tuple(made)), (change, tuple(moves)))
+        else:
             return self._push(full, change)
-        rest, motion = jax.jvp(self.source, (full, tuple(made)), (change, tuple(moves)))
         return self._push_stages(full, change, rest, motion) if self.stages else (rest, motion)
+
+    def motions(
+        self,
+        full: Full,
+        changes: Sequence[Full],
+        made: Sequence[Array],
+        moves: Sequence[Sequence[Array]],
+    ) -> list[Array]:
+        """Motions of the points for several changes; a program runs for them at the same time."""
+        both = list(zip(changes, moves, strict=True))
+        if not self.is_foreign:
+            return [self.push(full, change, made, own)[1] for change, own in both]
+        found = self.source_motions(full, changes, made, moves)
+        if not self.stages:
+            return found
+        rest = self.source(full, made)
+        pairs = zip(changes, found, strict=True)
+        return [self._push_stages(full, change, rest, own)[1] for change, own in pairs]
+
+    def source_motions(
+        self,
+        full: Full,
+        changes: Sequence[Full],
+        made: Sequence[Array],
+        moves: Sequence[Sequence[Array]],
+    ) -> list[Array]:
+        """The same before the stages, of what another program makes."""
+        assert self.construction is not None and self.making is not None
+        turn = self.construction.controls
+        turns = [jax.jvp(turn, (full,), (change,))[1] for change in changes]
+        return self.making.along(turn(full), made, list(zip(turns, moves, strict=True)))
+
+    def pull_stages(
+        self, full: Full, made: Sequence[Array], cotangent: Array
+    ) -> tuple[dict[str, Array], Array]:
+        """Cotangents of the values by the stages alone, and of the points before them."""
+        if not self.stages:
+            return {name: jnp.zeros_like(value) for name, value in full.items()}, cotangent
+        found: tuple[dict[str, Array], Array] = self._pull_stages(
+            full, self.source(full, made), cotangent
+        )
+        return found
 
     def pull(
         self, full: Full, made: Sequence[Array], cotangent: Array

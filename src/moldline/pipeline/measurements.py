@@ -137,8 +137,9 @@ class Measurements:
 
     @property
     def _is_made(self) -> bool:
-        """Whether the geometry is made from others, and so cannot be compiled once for all."""
-        return len(self.pipeline.feeding) > 1
+        """Whether others or a program make the geometry, which cannot be compiled once for all."""
+        names = self.pipeline.feeding
+        return len(names) > 1 or any(self.pipeline.branches[name].is_foreign for name in names)
 
     @cached_property
     def _recent(self) -> list["Measurements"]:

@@ -27,6 +27,9 @@ Values: TypeAlias = Mapping[str, Any]
 States: TypeAlias = dict[str, Array]
 """Points of geometries behind their stages, by name."""
 
+SEVERAL = 32
+"""Directions that are asked for at a time: as many motions must be held."""
+
 log = logging.getLogger("moldline.pipeline")
 
 
@@ -160,8 +163,16 @@ class Pipeline(eqx.Module):
         gradient: dict[str, Array] = {name: jnp.zeros_like(value) for name, value in full.items()}
         waiting: States = {self.result: array}
         for branch in reversed(list(here._feeders())):
+            if branch.name not in waiting:  # a program behind it has asked for its directions
+                continue
             made = [states[name] for name in branch.of]
-            by_values, by_made = branch.pull(full, made, waiting.pop(branch.name))
+            own = waiting.pop(branch.name)
+            if branch.is_foreign:
+                by_values, own = branch.pull_stages(full, made, own)
+                by_values = here._by_directions(branch, full, states, own, by_values)
+                gradient = {name: gradient[name] + by_values[name] for name in full}
+                continue
+            by_values, by_made = branch.pull(full, made, own)
             gradient = {name: gradient[name] + by_values[name] for name in full}
             for name, part in zip(branch.of, by_made, strict=True):
                 waiting[name] = waiting[name] + part if name in waiting else part
@@ -173,6 +184,12 @@ class Pipeline(eqx.Module):
         full = self.values(values)
         size = self.variables[name].size
         here, states = self._at(full)
+        if any(branch.is_foreign for branch in here._feeders()):
+            found: list[Array] = []
+            for part in _units(full, [name]):
+                changes = [change for *_, change in part]
+                found += here._motions(full, states, changes, here.result)
+            return np.stack([np.asarray(motion) for motion in found], axis=-1)
         push = here._linear(full, name)
         columns = np.empty((len(states[self.result]), 3, size))
         for i in tqdm(range(size), desc=f"sensitivity to {name}", delay=2, leave=False):
@@ -265,6 +282,41 @@ class Pipeline(eqx.Module):
 
         return push
 
+    def _motions(
+        self, full: dict[str, Array], states: States, changes: Sequence[dict[str, Array]], name: str
+    ) -> list[Array]:
+        """Motions of a geometry's points for several changes of the values."""
+        moves: dict[str, list[Array]] = {}
+        for other in feeding(self.branches, name):
+            branch = self.branches[other]
+            own = [[moves[part][k] for part in branch.of] for k in range(len(changes))]
+            made = [states[part] for part in branch.of]
+            moves[other] = branch.motions(full, changes, made, own)
+        return moves[name]
+
+    def _by_directions(
+        self,
+        branch: Branch,
+        full: dict[str, Array],
+        states: States,
+        cotangent: Array,
+        gradient: dict[str, Array],
+    ) -> dict[str, Array]:
+        """Add what a program's source gives, by the directions of all variables before it."""
+        assert branch.construction is not None
+        turned = {variable.name for variable in branch.construction.links}
+        for other in feeding(self.branches, branch.name)[:-1]:
+            turned |= self.branches[other].turned_by
+        made = [states[name] for name in branch.of]
+        for part in _units(full, [name for name in full if name in turned]):
+            changes = [change for *_, change in part]
+            before = [self._motions(full, states, changes, name) for name in branch.of]
+            moves = [list(own) for own in zip(*before, strict=True)] or [[] for _ in part]
+            found = branch.source_motions(full, changes, made, moves)
+            for (name, i, _), motion in zip(part, found, strict=True):
+                gradient[name] = jnp.asarray(gradient[name]).at[i].add(jnp.sum(motion * cotangent))
+        return gradient
+
     @cached_property
     def _recent(self) -> list["Pipeline"]:
         """The pipeline that was made anew last, for the values near those it was made for."""
@@ -293,3 +345,17 @@ def _assembly(geometries: Geometry | Mapping[str, Geometry] | Assembly) -> Assem
         return geometries
     named = geometries if isinstance(geometries, Mapping) else {"geometry": geometries}
     return Assembly(named)
+
+
+def _units(
+    full: Mapping[str, Array], names: Sequence[str]
+) -> Iterator[list[tuple[str, int, dict[str, Array]]]]:
+    """Changes of one number each, with its variable and place in it, some at a time."""
+    places = [(name, i) for name in names for i in range(len(full[name]))]
+    for start in range(0, len(places), SEVERAL):
+        yield [(name, i, _unit(full, name, i)) for name, i in places[start : start + SEVERAL]]
+
+
+def _unit(full: Mapping[str, Array], name: str, i: int) -> dict[str, Array]:
+    zeros = {other: jnp.zeros_like(value) for other, value in full.items()}
+    return {**zeros, name: zeros[name].at[i].set(1.0)}

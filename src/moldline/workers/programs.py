@@ -81,6 +81,11 @@ class Job:
         """Where its results are kept."""
         return self.store / self.key
 
+    @property
+    def is_kept(self) -> bool:
+        """Whether an earlier run left what is wanted."""
+        return all((self.place / name).is_file() for name in self.wanted)
+
     def kept(self) -> "Ran | None":
         """What an earlier run left, if there was one."""
         try:
@@ -231,3 +236,18 @@ def _lines(log: Path) -> Iterator[str]:
         text = file.read().decode(errors="replace")
     for line in text.splitlines()[-LAST:]:
         yield "".join(c if c.isprintable() else " " for c in line)[:300]
+
+
+def settled(job: Job, found: Ran) -> None:
+    """Have results in this machine's store, where another machine kept them in its own."""
+    if job.is_kept:
+        return
+    job.store.mkdir(parents=True, exist_ok=True)
+    beside = Path(tempfile.mkdtemp(prefix=f"{job.key[:12]}-", dir=job.store))
+    for name, contents in found.files.items():
+        (beside / name).parent.mkdir(parents=True, exist_ok=True)
+        (beside / name).write_bytes(contents)
+    try:
+        beside.rename(job.place)
+    except OSError:  # another was sooner
+        shutil.rmtree(beside, ignore_errors=True)

@@ -15,7 +15,7 @@ def blocks(language):
 
 def test_the_page_s_document_is_answered_as_it_shows(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    request, answer = blocks("xml")
+    request, answer, *_ = blocks("xml")
     Path("model.input.xml").write_text(request)
     for script in blocks("python"):
         exec(script, {})

@@ -112,6 +112,13 @@ def test_values_of_a_file_that_are_no_numbers_are_told(tmp_path, capsys, said, m
     assert message in capsys.readouterr().err
 
 
+def test_values_that_a_modeler_would_refuse_are_told(tmp_path, capsys):
+    case = tmp_path / "wing.toml"
+    case.write_text(WING.read_text().replace("bounds = [0.0, 45.0]\n", ""))
+    assert main(["build", str(case), "--set", "sweep=95,0", "-o", str(tmp_path / "wing.tri")]) == 1
+    assert "wing.toml: stage 'wing': sweep must lie within 80 degrees" in capsys.readouterr().err
+
+
 def test_a_part_is_written_alone(folder, capsys):
     target = folder / "wing.stl"
     case = str(folder / "cross.toml")

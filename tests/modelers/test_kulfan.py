@@ -94,6 +94,8 @@ def test_the_fit_of_a_case_file():
         ({"lower": [np.nan]}, "list of 1 to 100 finite coefficients"),
         ({"exponents": (0.0, 1.0)}, "above 0 at the nose"),
         ({"edge": 0.0}, "leave it out for a sharp trailing edge"),
+        ({"edge": np.inf}, "edge must be a finite number, got inf"),
+        ({"tail": np.nan}, "tail must be a finite number, got nan"),
     ],
 )
 def test_what_is_no_section_is_refused(options, said):

@@ -113,6 +113,31 @@ def test_the_geometry_at_rest_is_that_of_the_variables_own_values():
     assert np.ptp(case.geometry.points[:, 0]) == 5.0
 
 
+COARSE = {"chordwise": 9, "spanwise": 4}
+
+
+@pytest.mark.parametrize(
+    ("modeler", "parameter", "value", "message"),
+    [
+        (ml.Wing([3.0, 5.0], 1.0, **COARSE), "sweep", 30.0, "'wing': sweep .*were they degrees"),
+        (ml.Wing([3.0, 5.0], 1.0, **COARSE), "span", [5.0, 3.0], "ascending and above 0"),
+        (ml.Wing(5.0, 1.0, **COARSE), "thickness", -0.1, "thickness must be above 0"),
+        (ml.TrapezoidalWing(5.0, 4.0, **COARSE), "taper", -0.5, "taper must be above 0"),
+        (ml.TrapezoidalWing(5.0, 4.0, **COARSE), "dihedral", 5.0, "were they degrees"),
+        (ml.Body([1.0, 2.0], [0.0, 1.0, 0.5]), "radius", [1.0, -0.5], "radius must be above 0"),
+        (ml.Body([1.0, 2.0], [0.0, 1.0, 0.5]), "exponent", 0.5, "exponent must be 1 or more"),
+        (ml.Nacelle(3.0, 1.0, around=8, chordwise=9), "droop", 3.0, "droop .*was it degrees"),
+    ],
+)
+def test_values_that_a_modeler_would_refuse_are_refused_of_variables(
+    modeler, parameter, value, message
+):
+    own = ml.variable("own", value=value)
+    link = links.named(modeler, parameter, absolute=True)
+    with pytest.raises(ParameterError, match=message):
+        ml.Pipeline({}, [ml.Construction(modeler, {own: link})])
+
+
 def test_a_deformer_follows_what_a_modeler_moves():
     box = ml.Lattice.box((-1, -1, -1), (7, 2, 2), (4, 2, 2))
     t = ml.variable("t", size=4)

@@ -63,12 +63,19 @@ class Case:
         return None if table is None else table.units
 
     def values(self, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """The case's values with some replaced; a value outside its bounds is refused."""
+        """The case's values with some replaced.
+
+        A value outside its bounds is refused, and one that a modeler would refuse in its text.
+        """
         values = self.pipeline.values(changes)
         known = self.pipeline.variables
         beyond = [line for name, value in values.items() for line in known[name].outside(value)]
         if beyond:
             raise ParameterError(f"{self.path}: " + "; ".join(beyond))
+        for stage in self.pipeline.stages:
+            if isinstance(stage, Construction):
+                with _told(str(self.path)):
+                    stage.check(values)
         return values
 
     def embed(self, points: Geometry | Points, on: str = "", name: str = "embedded") -> Pipeline:

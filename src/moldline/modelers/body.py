@@ -1,6 +1,6 @@
 """A body along x with super-ellipses as its sections."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +18,7 @@ from .loft import Lofting, row_places
 from .quantities import (
     Numbers,
     Quantities,
+    ascending,
     choices,
     even_ring,
     placed,
@@ -94,9 +95,7 @@ class Body(AbstractShape):
         self.free = _free({key: own[key] for key in sizes}, count)
         for key in sizes:
             own[key] = own[key][self.free] if len(own[key]) > 1 else own[key]
-        for key in ("exponent", "lower_exponent"):
-            if key in own and not np.all(own[key] >= 1):
-                raise ParameterError(f"{key} must be 1 or more, got {own[key].tolist()}")
+        _check(own)
         reach, self.reach = reaches("length", length, count)
         place = placed(origin, half, "half a body")
         self.quantities = Quantities({"length": reach} | own | {"origin": place})
@@ -149,6 +148,15 @@ class Body(AbstractShape):
     def build(cls, folder: Path, **options: Any) -> "Body":
         return cls(**options)
 
+    @override
+    def check(self, parameters: Vector) -> None:
+        given = self.quantities.parted(np.asarray(parameters))
+        ascending("length", np.asarray(given["length"]))
+        for name in ("radius", "width", "height"):
+            if name in given:
+                positive(name, np.asarray(given[name]))
+        _check(given)
+
     @property
     @override
     def parameters(self) -> dict[str, np.ndarray]:
@@ -196,6 +204,12 @@ class Body(AbstractShape):
     def geometry(self) -> Surface:
         points = np.asarray(shaped(self, self.values))
         return Surface(points, self.layout.faces(points), components=(self.name,))
+
+
+def _check(given: Mapping[str, Any]) -> None:
+    for name in ("exponent", "lower_exponent"):
+        if name in given and not np.all(given[name] >= 1):
+            raise ParameterError(f"{name} must be 1 or more, got {given[name].tolist()}")
 
 
 def _sizes(radius: Any, width: Any, height: Any) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from .._types import Array, ArrayLike, Scalar, Vector
 from ..errors import ParameterError
 from ..mesh import Section
 from .airfoil import AbstractAirfoil, Outline, outlined
+from .quantities import finite
 from .spacing import Spacing
 from .tabulated import found, two_sides
 
@@ -83,6 +84,7 @@ class Kulfan(AbstractAirfoil):
                 f"the edge's thickness must be above 0 of chord, got {edge}; leave it out for a "
                 "sharp trailing edge"
             )
+        finite(edge=edge, tail=tail, nose=nose)
         self.edge, self.tail, self.nose = (
             None if given is None else float(given) for given in (edge, tail, nose)
         )

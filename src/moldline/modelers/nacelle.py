@@ -101,11 +101,10 @@ class Nacelle(AbstractShape):
             "exit_radius": _around("exit_radius", exits),
             "thickness": _around("thickness", thick),
         }
-        for key, numbers in own.items():
-            positive(key, numbers, "of the length" if key == "thickness" else "m")
         own["camber"] = np.array([camber])
         for key, angle in radians(degrees, droop=droop, scarf=scarf).items():
-            own[key] = _tilt(key, angle)
+            own[key] = np.array([angle], float)
+        _check(own)
         own["origin"] = placed(origin, half, "half a nacelle")
         sections = {f"section {key}": numbers for key, numbers in self.profile.numbers.items()}
         self.quantities = Quantities(own | sections)
@@ -132,6 +131,10 @@ class Nacelle(AbstractShape):
     @override
     def build(cls, folder: Path, **options: Any) -> "Nacelle":
         return cls(airfoil=airfoil_of(options.pop("airfoil", "naca 0012"), folder), **options)
+
+    @override
+    def check(self, parameters: Vector) -> None:
+        _check(self.quantities.parted(np.asarray(parameters)))
 
     @property
     @override
@@ -231,9 +234,12 @@ def _around(name: str, given: Any) -> np.ndarray:
     return numbers
 
 
-def _tilt(name: str, given: float) -> np.ndarray:
-    if not abs(given) <= STEEPEST:
-        raise ParameterError(
-            f"{name} must lie within 60 degrees either way [rad], got {given}; was it degrees?"
-        )
-    return np.array([given], float)
+def _check(given: Mapping[str, Any]) -> None:
+    for name in ("length", "radius", "exit_radius", "thickness"):
+        positive(name, given[name], "of the length" if name == "thickness" else "m")
+    for name in ("droop", "scarf"):
+        if not abs(given[name][0]) <= STEEPEST:
+            raise ParameterError(
+                f"{name} must lie within 60 degrees either way [rad], got {given[name][0]}; was "
+                "it degrees?"
+            )

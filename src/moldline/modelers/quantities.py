@@ -77,6 +77,13 @@ def positive(name: str, numbers: np.ndarray, unit: str = "m") -> None:
         raise ParameterError(f"{name} must be above 0 [{unit}], got {numbers.tolist()}")
 
 
+def finite(**given: float | None) -> None:
+    """Refuse what is no number; None, which stands for nothing given, passes."""
+    for name, value in given.items():
+        if value is not None and not np.isfinite(value):
+            raise ParameterError(f"{name} must be a finite number, got {value}")
+
+
 def reaches(name: str, given: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
     """How far stations are from the first, and what takes numbers to the places of all stations.
 
@@ -92,12 +99,17 @@ def reaches(name: str, given: Any, count: int) -> tuple[np.ndarray, np.ndarray]:
             f"{name} takes one number, or the distance from the first station of each of the "
             f"{count - 1} others; got {given}"
         )
+    ascending(name, numbers)
+    return numbers, np.eye(count)[:, 1:]
+
+
+def ascending(name: str, numbers: np.ndarray) -> None:
+    """Refuse distances of stations that turn back."""
     if not np.all(np.diff(numbers, prepend=0.0) > 0):
         raise ParameterError(
             f"{name} has the distances of stations from the first one, ascending and above 0 [m]; "
             f"got {numbers.tolist()}"
         )
-    return numbers, np.eye(count)[:, 1:]
 
 
 def radians(is_degrees: bool, **angles: Any) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """A wing of two stations, by the numbers of its trapezium."""
 
 import inspect
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -57,10 +58,15 @@ class TrapezoidalWing(AbstractShape):
             raise ParameterError(f"give area or chord, got area = {area} and chord = {chord}")
         size = {"area": area} if chord is None else {"chord": chord}
         angles = radians(degrees, sweep=sweep, dihedral=dihedral, twist=twist)
-        self.quantities = Quantities({"span": span, **size, "taper": taper, **angles})
+        given = {"span": span, **size, "taper": taper, **angles}
+        for name, value in given.items():
+            if np.ndim(value):
+                raise ParameterError(
+                    f"{name} of a trapezoidal wing is one number, got {value}; a Wing takes lists"
+                )
+        self.quantities = Quantities(given)
         own = {name: float(own[0]) for name, own in self.quantities.parted(self.values).items()}
-        for name in ("span", *size, "taper"):
-            positive(name, np.array(own[name]), {"area": "m²", "taper": "1"}.get(name, "m"))
+        _check(own)
         root, tip = _chords(own)
         self.wing = Wing(
             own["span"],
@@ -94,7 +100,17 @@ class TrapezoidalWing(AbstractShape):
         return self.quantities.values
 
     @override
+    def check(self, parameters: Vector) -> None:
+        given = self.quantities.parted(np.asarray(parameters))
+        _check({name: float(own[0]) for name, own in given.items()})
+        self.wing.check(np.asarray(self._full(jnp.asarray(parameters))))
+
+    @override
     def __call__(self, parameters: Vector) -> Points:
+        return self.wing(self._full(parameters))
+
+    def _full(self, parameters: Vector) -> Array:
+        """Parameters of the wing."""
         given = {name: own[0] for name, own in self.quantities.parted(parameters).items()}
         root, tip = _chords(given)
         full = jnp.concatenate([jnp.asarray(own) for own in self.wing.quantities.numbers])
@@ -102,12 +118,18 @@ class TrapezoidalWing(AbstractShape):
         for name in ("span", "sweep", "dihedral"):
             full = full.at[rows[name]].set(given[name])
         full = full.at[rows["chord"]].set(jnp.stack([root, tip]))
-        return self.wing(full.at[rows["twist"][1]].set(given["twist"]))
+        return full.at[rows["twist"][1]].set(given["twist"])
 
     @property
     @override
     def geometry(self) -> Surface:
         return self.wing.geometry.moved(np.asarray(shaped(self, self.values)))
+
+
+def _check(given: Mapping[str, float]) -> None:
+    for name, unit in {"span": "m", "area": "m²", "chord": "m", "taper": "1"}.items():
+        if name in given:
+            positive(name, np.array(given[name]), unit)
 
 
 def _chords(given: dict[str, Any]) -> tuple[Scalar | Array, Scalar | Array]:

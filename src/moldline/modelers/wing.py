@@ -19,8 +19,10 @@ from .profile import Profile, scaled
 from .quantities import (
     Numbers,
     Quantities,
+    ascending,
     base_points_of,
     choices,
+    finite,
     placed,
     positive,
     radians,
@@ -117,6 +119,7 @@ class Wing(AbstractShape):
         name: str = "wing",
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
+        finite(sweep_at=sweep_at, twist_at=twist_at)
         choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
         if sides == 2 and along != "y":
             raise ParameterError(f"a wing with two sides lies along y, got along = {along!r}")
@@ -140,10 +143,8 @@ class Wing(AbstractShape):
         if each["thickness"] is None:
             each["thickness"] = thick if np.ptp(thick) else thick[0]
         own = {key: spread(key, given, count, "station") for key, given in each.items()}
-        for key, given in panels.items():
-            own[key] = _leaning(key, spread(key, given, count - 1, "panel"))
-        positive("chord", own["chord"])
-        positive("thickness", own["thickness"], "of the chord")
+        own |= {key: spread(key, given, count - 1, "panel") for key, given in panels.items()}
+        _check(own)
         names = ("chord", "sweep", "dihedral", "twist", "thickness", "camber")
         shape = {"span": reach} | {key: own[key] for key in names} | {"origin": origin}
         sections = {
@@ -211,6 +212,12 @@ class Wing(AbstractShape):
         else:
             airfoil = airfoil_of(airfoil, folder)
         return cls(airfoil=airfoil, **options)
+
+    @override
+    def check(self, parameters: Vector) -> None:
+        given = self.quantities.parted(np.asarray(parameters))
+        ascending("span", np.asarray(given["span"]))
+        _check(given)
 
     @property
     @override
@@ -289,10 +296,12 @@ class Wing(AbstractShape):
         return Surface(points, faces, tags, tuple(names[is_used].tolist()))
 
 
-def _leaning(name: str, angles: np.ndarray) -> np.ndarray:
-    if not np.all(np.abs(angles) <= STEEPEST):
-        raise ParameterError(
-            f"{name} must lie within 80 degrees either way [rad], got {angles.tolist()}; were "
-            "they degrees? A wing that stands up is one with along = 'z'"
-        )
-    return angles
+def _check(given: Mapping[str, Any]) -> None:
+    for name in ("sweep", "dihedral"):
+        if not np.all(np.abs(given[name]) <= STEEPEST):
+            raise ParameterError(
+                f"{name} must lie within 80 degrees either way [rad], got {given[name].tolist()}; "
+                "were they degrees? A wing that stands up is one with along = 'z'"
+            )
+    positive("chord", given["chord"])
+    positive("thickness", given["thickness"], "of the chord")

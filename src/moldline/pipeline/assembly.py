@@ -87,6 +87,7 @@ class Assembly:
         for name in stage.of:
             check_name(name, self.names)
         full = {name: jnp.asarray(v.value, float) for name, v in self.variables.items()}
+        stage.check(full)
         made = [self._branch(name) for name in stage.of]
         points = _states(self._done, full, stage.of)
         making = stage.bind([taken(branch, points[branch.name]) for branch in made])

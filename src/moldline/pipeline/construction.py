@@ -72,6 +72,13 @@ class Construction(eqx.Module):
         """Parameters from the variables' values, given in the designer's units."""
         return turned(self.modeler.values, self.links, values)
 
+    def check(self, values: Mapping[str, Float[Array, "v"]]) -> None:
+        """Refuse values that make no sense as parameters; an error names the stage."""
+        try:
+            self.modeler.check(self.controls(values))
+        except ParameterError as error:
+            raise ParameterError(f"stage {self.name!r}: {error}") from None
+
     def bind(self, geometries: Sequence[Geometry]) -> AbstractMaking:
         """The modeler tied to geometries; an error names the stage."""
         try:

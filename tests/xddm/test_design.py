@@ -162,6 +162,7 @@ def test_without_derivatives_there_are_none(folder, balls):
         ("pin.tri", "pan.tri", MoldlineError, "Parts: no file 'pan.tri'; looked at"),
         ('ID="radius" Value="1.1"', 'ID="width" Value="1"', MoldlineError,
          "line 7: Variable 'width': .*one.xml has no Model__one__Variable__width; it has: Model"),
+        ('ID="alone" Parts', "Parts", MoldlineError, "each of several Intersects needs an ID of"),
         ('Geometry="alone" ', "", MoldlineError, "Analysis 'bulk': say of which Intersect"),
         ('Geometry="alone" ', 'Geometry="lone" ', MoldlineError, "'lone' is the ID of no Inter"),
         ('"volume"', '"bulk"', MoldlineError, "Analysis 'bulk': no measures? named 'bulk'"),
@@ -182,3 +183,12 @@ def test_a_model_that_fails_is_named(folder):
 
     with pytest.raises(ParameterError, match=r"design.xml: Model 'one': out of steel"):
         run(folder, fail)
+
+
+def test_no_name_leads_out_of_the_folder(folder, balls):
+    evil = DESIGN.replace('"alone"', '"../../out"')
+    with pytest.raises(ParameterError, match=r"the ID '../../out' cannot name a folder"):
+        deliver(run(folder, balls, evil), folder)
+    (folder / "two.xml").write_text(PART.format(name="../two", radius=0.8, place=0.9))
+    with pytest.raises(ParameterError, match=r"the ID '../two' cannot name a folder"):
+        run(folder, balls)

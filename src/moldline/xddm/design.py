@@ -21,7 +21,7 @@ from .document import Document
 from .document import read as read_document
 from .edit import Edit
 from .element import JOINT, Element
-from .exchange import Answer, Linearised, deliver
+from .exchange import Answer, Linearised, deliver, folder_name
 from .matching import places
 from .measure_table import measure_table
 from .model import Design, Intersect, Value
@@ -63,6 +63,9 @@ def driven(design: Design, source: Design, folder: Path, serve: Server) -> Answe
     for them, and leave their answers in folders of their own. Results of flow solvers stay as they
     are; what is made of one that is not there yet waits.
     """
+    ids = [one.id for one in design.intersects]
+    if len(ids) > 1 and (len(set(ids)) < len(ids) or "" in ids):
+        design.document.refuse(design.target, "each of several Intersects needs an ID of its own")
     names = dict.fromkeys(part for one in design.intersects for part in one.parts)
     if not names:
         design.document.refuse(design.target, "has no Intersect with Parts, so nothing to make")
@@ -73,7 +76,7 @@ def driven(design: Design, source: Design, folder: Path, serve: Server) -> Answe
     wetted: dict[str, Wetted] = {}
     for one in design.intersects:
         wetted[one.id] = Wetted(design, one, [parts[name] for name in one.parts])
-    surfaces = {name: one.linearised for name, one in wetted.items()}
+    surfaces = {name or "wetted": one.linearised for name, one in wetted.items()}
     for value in design.analyses:
         if value.element.get("Measure") and _is_own(value):
             results[value.name] = wetted[_geometry(design, value)].measured(
@@ -125,7 +128,7 @@ def _model(path: Path, design: Design, folder: Path, serve: Server) -> Part:
     within = [e for e in design.target.all("Model") if e.id == model.target.id]
     request = _set(model, design, within[0]) if within else model.document
     asked = Design(asking(request, bool(differentiated(design))))
-    place = folder / MODELS / model.target.id
+    place = folder / MODELS / folder_name(model.target.id)
     place.mkdir(parents=True, exist_ok=True)
     try:
         answer = serve(asked, model, place)

@@ -1,6 +1,7 @@
 """What a design framework and a geometry server leave for each other in a folder."""
 
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import numpy as np
 from ..errors import FileError, ParameterError
 from ..mesh import Surface
 from ..mesh.io.sensitivities import write_sensitivities
+from ..mesh.io.text import quoted
 from .chain import Quantity, evaluated
 from .model import Design
 from .results import filled
@@ -67,6 +69,16 @@ class Answer:
         return Answer(self.design, self.surfaces, results, self.units, (*self.notes, *waiting))
 
 
+def folder_name(name: str) -> str:
+    """A name as that of a folder; what would lead elsewhere is refused."""
+    plain = re.sub(r"[\[\],]", "_", name)
+    if not re.fullmatch(r"[^/\\:*?\"<>|\x00-\x1f]{1,200}", plain) or not plain.strip("."):
+        raise ParameterError(
+            f"the ID {quoted(name)} cannot name a folder; use letters, digits, '_' and '-'"
+        )
+    return plain
+
+
 def reported(answer: Answer) -> dict[str, Quantity]:
     """Results that the request has a place for; derivatives of those alone that are Required."""
     found = {}
@@ -97,13 +109,13 @@ def deliver(answer: Answer, folder: Path, layout: str = "both") -> None:
         document.save(stage / ANSWER)
         places: dict[Path, Path] = {}
         for number, (name, linearised) in enumerate(answer.surfaces.items()):
-            own = folder if len(answer.surfaces) == 1 else folder / f"design/geometry_{name}"
+            inner = folder / f"design/geometry_{folder_name(name)}"
+            own = folder if len(answer.surfaces) == 1 else inner
             part = stage / str(number)
             part.mkdir()
             places |= _written(part, own, linearised, answer.units, layout)
             if linearised.columns and layout != "one":
-                root = folder / f"design/geometry_{name}/geometry"
-                places |= _written_each(part, root, linearised, answer.units)
+                places |= _written_each(part, inner / "geometry", linearised, answer.units)
         (folder / ANSWER).unlink(missing_ok=True)
         for new, place in places.items():
             place.parent.mkdir(parents=True, exist_ok=True)

@@ -92,7 +92,8 @@ def _check(asked: Design, source: Design) -> None:
 def _check_loop(source: Design) -> None:
     """Refuse a Wrapper that would serve the very document that names it."""
     words = (source.target.get("Wrapper") or "").split()
-    if "serve" in words and source.document.path.name in {Path(word).name for word in words}:
+    own = source.document.path.resolve()
+    if "serve" in words and own in {(own.parent / word).resolve() for word in words}:
         source.document.refuse(
             source.target,
             'its Wrapper serves this same document, which names no Case; add Case="..." or the '

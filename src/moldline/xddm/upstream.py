@@ -16,7 +16,7 @@ from ..pipeline.pipeline import Pipeline
 from .asked import asking, differentiated
 from .chain import Quantity
 from .element import JOINT, Element
-from .exchange import Answer, Linearised
+from .exchange import Answer, Linearised, folder_name
 from .linearised_shape import LinearisedShape
 from .model import Design, Value
 
@@ -73,7 +73,7 @@ def behind(case: Case, design: Design, source: Design, folder: Path, serve: Serv
                 f"{case.path}: {', '.join(case.tables.geometry) or 'it has none'}"
             )
         asked = _request(design, model)
-        answer = serve(asked, model, folder / "models" / model.target.id)
+        answer = serve(asked, model, folder / "models" / folder_name(model.target.id))
         (surface,) = answer.surfaces.values()
         metres = METRES[case.tables.geometry[model.target.id].units or "m"]
         scaled = Linearised(

@@ -74,7 +74,10 @@ def program(source: Design, limit: float = LIMIT) -> Program:
             source.target, "has no Wrapper, expected the command that makes its surface"
         )
     folder = source.document.path.parent.resolve()
-    whole = [str(folder / word) if (folder / word).is_file() else word for word in words]
+    whole = [
+        str(folder / word) if (k == 0 or "." in word) and (folder / word).is_file() else word
+        for k, word in enumerate(words)
+    ]
     if not shutil.which(whole[0]):
         source.document.refuse(
             source.target,

@@ -340,3 +340,18 @@ def test_a_changed_file_is_another_case(tmp_path):
     assert len(seen) == 4
     assert fingerprint({"path": str(case)}) in seen
     fingerprint({"path": str(tmp_path / "absent.toml")})  # who loads it says what is wrong
+
+
+@pytest.mark.slow
+def test_few_processes_serve_many_cases_and_rest_when_idle(folder, tmp_path):
+    place = tmp_path / "socket"
+    with serving("--socket", str(place), "--processes", "1", "--idle", "3"):
+        until(place.exists)
+        with Client.connect(place) as client:
+            cases = [client.open(folder / f"{name}.toml") for name in ("one", "two")]
+            for case in cases * 2:
+                assert case.points(LIFT).shape == (N, 3)
+                assert sum(one["pid"] is not None for one in client.cases()) == 1
+            assert [one["loads"] for one in client.cases()] == [3, 3]
+            until(lambda: not any(one["pid"] for one in client.cases()))
+            assert cases[0].points(LIFT).shape == (N, 3)

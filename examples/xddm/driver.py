@@ -74,7 +74,7 @@ def main():
             lambda x: asked(x, folder)[0] - wanted, start, lambda x: asked(x, folder)[1],
             method="lm", x_scale="jac", xtol=1e-9,
         )  # fmt: skip
-    each = (np.mean(times[1:]) - times[0]) / len(start)
+    each = float(np.mean(times[1:]) - times[0]) / len(start)
     miss = float(np.abs(found.fun).max())
     print(f"{len(times) - 1} answers; the largest miss is {miss:.2g} [m, m3]")
     print(f"derivatives: {each:.2g} s per variable; the paper's differences took about 7 s")

@@ -62,6 +62,7 @@ def _serves_models():
 @pytest.mark.skipif(not _serves_models(), reason="`moldline serve MODEL` is not there yet")
 def test_a_framework_finds_the_target_by_files_alone(programs, monkeypatch, tmp_path):
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path))
+    monkeypatch.setenv("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
     driver = runpy.run_path(str(EXAMPLE / "driver.py"))
     numbers = driver["main"]()
     assert numbers["miss"] < 1e-9

@@ -75,9 +75,9 @@ class Owners:
         for number, vertex in zip(self.vertices.tolist(), shape.vertices, strict=True):
             if number >= 0:
                 points[number] = occ.BRep.BRep_Tool.Pnt_s(vertex).Coord()
-        for nodes, edge in zip(self.edges, shape.edges, strict=True):
-            if len(nodes.points):
-                points[nodes.points] = along(edge, nodes.fractions)
+        for line, edge in zip(self.edges, shape.edges, strict=True):
+            if len(line.points):
+                points[line.points] = along(edge, line.fractions)
         if self.size:
             border = [
                 on_border(face, nodes.sides, nodes.fractions)

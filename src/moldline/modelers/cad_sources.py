@@ -90,7 +90,7 @@ def _colours(shape: Any, parts: Topology, tool: Any) -> tuple[str, ...]:
             colour = occ.Quantity.Quantity_Color()
             for way in (surface.XCAFDoc_ColorSurf, surface.XCAFDoc_ColorGen):
                 if tool.GetColor(group, way, colour):
-                    text = occ.Quantity.Quantity_Color.ColorToHex_s(colour).lower()
+                    text = occ.Quantity.Quantity_Color.ColorToHex_s(colour).ToCString().lower()
                     for face in own:
                         colours[face] = colours[face] or text
                     break

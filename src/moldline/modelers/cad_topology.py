@@ -163,11 +163,11 @@ def difference(base: Topology, other: Topology) -> str:
         ]  # fmt: skip
         if sides[0] != sides[1]:
             return f"its face {number} is bounded by other edges"
-    for number, (one, two) in enumerate(zip(base.edges, other.edges, strict=True), start=1):
-        if one.ends != two.ends:
+    for number, (was, now) in enumerate(zip(base.edges, other.edges, strict=True), start=1):
+        if was.ends != now.ends:
             return f"its edge {number} joins other vertices"
-        if one.kind != two.kind:
-            return f"its edge {number} is a {two.kind} in place of a {one.kind}"
+        if was.kind != now.kind:
+            return f"its edge {number} is a {now.kind} in place of a {was.kind}"
     return ""
 
 

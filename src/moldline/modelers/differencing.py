@@ -7,16 +7,19 @@ the fourth order. Their disagreement says how large an error to expect.
 
 import logging
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import numpy as np
 from typing_extensions import override
 
-from .._types import Array
+from .._types import Array, Points, Vector
 from ..errors import GeometryError, ParameterError
+from ..mesh import Geometry, Surface
 from ..numerics.kernel import AbstractKernel, Arrays
+from .base import AbstractMaking, AbstractShape
 from .quantities import Quantities
 
 STEP = 1e-3
@@ -88,16 +91,20 @@ class Programmed(AbstractKernel):
         self,
         function: Callable[[dict[str, Any]], np.ndarray],
         given: Mapping[str, Any],
-        steps: Mapping[str, float] | None = None,
+        steps: Mapping[str, float] | None,
+        points: np.ndarray,
     ):
-        """`function` takes numbers and lists by name, as they are `given` to begin with."""
+        """`function` takes numbers and lists by name.
+
+        `given` is what they are to begin with, and `points` what comes of that.
+        """
         self.function, self.given = function, dict(given)
         self.quantities = Quantities(self.given)
         self.steps = steps_of(self.quantities, steps)
         self.lock = threading.RLock()
-        self.points: tuple[bytes, np.ndarray] | None = None
+        self.points = self.values.tobytes(), points
         self.slopes: tuple[bytes, Differences] | None = None
-        self.shape = self._call(self.values).shape
+        self.shape = points.shape
 
     @property
     def values(self) -> np.ndarray:
@@ -123,7 +130,7 @@ class Programmed(AbstractKernel):
         (values,) = arrays
         with self.lock:
             key = values.tobytes()
-            if self.points is None or self.points[0] != key:
+            if self.points[0] != key:
                 self.points = key, self._call(values)
             return (self.points[1].copy(),)
 
@@ -200,3 +207,62 @@ class Pulled(AbstractKernel):
     @override
     def transpose(self, cotangents: Arrays, arrays: Arrays) -> tuple[Array | None, ...]:
         return None, *Pushed(self.program)(arrays[0], *cotangents)
+
+
+class AbstractProgrammed(AbstractShape):
+    """A shape whose points another program makes.
+
+    Attributes
+    ----------
+    program
+        What makes the points of the parameters.
+    surface
+        What it makes of its own ones [m].
+    """
+
+    program: eqx.AbstractVar[Programmed]
+    surface: eqx.AbstractVar[Surface]
+
+    @property
+    @override
+    def parameters(self) -> dict[str, np.ndarray]:
+        return self.program.quantities.rows
+
+    @property
+    @override
+    def values(self) -> Vector:
+        return self.program.values
+
+    @property
+    @override
+    def geometry(self) -> Surface:
+        return self.surface
+
+    @override
+    def __call__(self, parameters: Vector) -> Points:
+        if not self.size:
+            return self.surface.points
+        return self.program(parameters)[0]
+
+    @override
+    def bind(self, *geometries: Geometry, names: Sequence[str] | None = None) -> "Modelled":
+        return Modelled(shape=self, geometry=self.surface)
+
+    def differences(self, parameters: Vector | None = None) -> Differences:
+        """Derivatives by all parameters, with their errors and steps."""
+        values = self.values if parameters is None else parameters
+        return self.program.differences(np.asarray(values, float))
+
+
+class Modelled(AbstractMaking):
+    """A shape of another program with what it makes of its own values; never compiled.
+
+    So its errors (a changed topology, a program that fails) stay what they are.
+    """
+
+    shape: AbstractShape
+    geometry: Geometry
+
+    @override
+    def __call__(self, parameters: Vector, *points: Any) -> Points:
+        return self.shape(parameters)

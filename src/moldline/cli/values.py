@@ -25,11 +25,12 @@ def configure(command: argparse.ArgumentParser) -> None:
         "--values", type=Path, metavar="FILE", help="JSON file of values: {name: number or list}"
     )
     command.add_argument(
-        "--jobs", type=_count, metavar="N", help="processor cores to use; all without it"
+        "--jobs", type=count, metavar="N", help="processor cores to use; all without it"
     )
 
 
-def _count(text: str) -> int:
+def count(text: str) -> int:
+    """A number of at least 1."""
     if not text.isdecimal() or not int(text):
         raise argparse.ArgumentTypeError(f"expected a count of at least 1, got {text!r}")
     return int(text)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import socket
 
-HELP = "Keep cases loaded and compiled, and answer clients: points, derivatives, measures."
+HELP = "Answer a design framework's files, or keep cases loaded and answer clients."
 EXAMPLE = """\
+  moldline serve wing.xml                                       (reads model.input.xml here)
   moldline serve --socket /tmp/moldline.sock
   moldline serve --port 7777                                    (this machine only)
   moldline serve --host 0.0.0.0 --port 7777 --token-file token  (others too, who know the token)"""
@@ -17,6 +18,27 @@ EXAMPLE = """\
 
 def configure(command: argparse.ArgumentParser) -> None:
     """Arguments."""
+    command.add_argument(
+        "model",
+        type=Path,
+        nargs="?",
+        help="XDDM Model, design or case: answer model.input.xml in this folder, and end",
+    )
+    command.add_argument(
+        "--layout",
+        choices=("one", "each", "both"),
+        help="with a model: derivatives in one file, in one for each variable, or both",
+    )
+    command.add_argument(
+        "--limit",
+        type=float,
+        default=600.0,
+        metavar="S",
+        help="with a model: seconds that a run of another program may take (600)",
+    )
+    command.add_argument(
+        "--workers", type=int, metavar="N", help="with a model: other programs run at a time"
+    )
     where = command.add_mutually_exclusive_group()
     where.add_argument("--socket", type=Path, metavar="PATH", help="listen on a Unix socket")
     where.add_argument("--port", type=int, help="listen on a TCP port; 0 takes a free one")
@@ -59,21 +81,34 @@ def configure(command: argparse.ArgumentParser) -> None:
 
 
 def run(given: argparse.Namespace) -> int:
-    """Serve until stopped; the status is then 0."""
+    """Answer, or serve until stopped; the status is then 0."""
     from ..errors import ParameterError
     from ..server import listening
 
+    if given.model is not None:
+        return _answer(given)
     if given.processes < 1 or given.idle <= 0:
         raise ParameterError("--processes and --idle must be above 0")
     if given.socket is not None:
         with listening.at_path(given.socket) as ours:
             return _serve(given, ours, {"socket": str(given.socket.absolute())})
     if given.port is None:
-        raise ParameterError("where to? give --socket PATH or --port N")
+        raise ParameterError("give a model to answer for, or --socket PATH or --port N to listen")
     if not 0 <= given.port < 65536:
         raise ParameterError(f"--port is from 0 to 65535, got {given.port}")
     with listening.at_port(given.host, given.port) as ours:
         return _serve(given, ours, {"host": given.host, "port": ours.getsockname()[1]})
+
+
+def _answer(given: argparse.Namespace) -> int:
+    from ..errors import ParameterError
+    from ..xddm.serving import answer
+
+    if given.socket is not None or given.port is not None:
+        raise ParameterError("a model is answered in this folder; --socket and --port are for none")
+    found = answer(given.model, ".", given.layout, given.limit, given.workers)
+    print("\n".join(["wrote Components.i.tri and model.output.xml", *found.notes]))
+    return 0
 
 
 def _serve(given: argparse.Namespace, ours: "socket.socket", where: dict[str, Any]) -> int:

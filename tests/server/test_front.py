@@ -6,7 +6,9 @@ import random
 import pytest
 
 from moldline.server import connection, listening, protocol
+from moldline.server.cases import Cases
 from moldline.server.front import Front
+from moldline.server.holder import Spare
 
 
 def frame(header):
@@ -25,7 +27,7 @@ def served(tmp_path, monkeypatch):
     path = tmp_path / "socket"
 
     async def run(talk):
-        front = Front(spare=False)
+        front = Front(Cases(1, 60.0, Spare(False)))
         with listening.at_path(path) as ours:
             serving = asyncio.create_task(front.serve(ours))
             try:

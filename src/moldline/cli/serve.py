@@ -57,6 +57,10 @@ def configure(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--ready", type=Path, metavar="FILE", help="write how to reach the server, once it listens"
     )
+    _configure_ends(command)
+
+
+def _configure_ends(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--processes", type=int, default=4, metavar="N", help="cases held at the same time (4)"
     )
@@ -115,17 +119,13 @@ def _serve(given: argparse.Namespace, ours: "socket.socket", where: dict[str, An
     import asyncio
 
     from ..server import listening
+    from ..server.cases import Cases
     from ..server.front import Front
+    from ..server.holder import Spare
 
     token = _token(given, is_needed=where.get("host", "127.0.0.1") not in listening.LOOPBACK)
-    front = Front(
-        token,
-        given.allow_shutdown,
-        given.processes,
-        given.idle,
-        given.quit_after,
-        not given.no_spare,
-    )
+    cases = Cases(given.processes, given.idle, Spare(not given.no_spare))
+    front = Front(cases, token, given.allow_shutdown, given.quit_after)
     with listening.announced(given.ready, {**where, "token": token, "pid": os.getpid()}):
         print("serving at " + (where.get("socket") or "{host}, port {port}".format(**where)))
         print(end="", flush=True)

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from .cases import Cases
 from .connection import Connection
-from .holder import WINDOW, Spare
+from .holder import WINDOW
 from .protocol import LARGEST_BODY
 
 TIDYING = 2.0
@@ -21,6 +21,8 @@ class Front:
 
     Attributes
     ----------
+    cases
+        What is open.
     token
         What a client must know; None where any may come in.
     may_shut_down
@@ -29,25 +31,21 @@ class Front:
         Seconds without any client after which it stops; None for never.
     largest
         Bytes of a request's arrays.
-    cases
-        What is open.
     """
 
     def __init__(
         self,
+        cases: Cases,
         token: str | None = None,
         may_shut_down: bool = False,
-        processes: int = 4,
-        idle: float = 1800.0,
         quit_after: float | None = None,
-        spare: bool = True,
         largest: int = LARGEST_BODY,
     ):
         self.token = token
         self.may_shut_down = may_shut_down
         self.quit_after = quit_after
         self.largest = largest
-        self.cases = Cases(processes, idle, Spare(spare))
+        self.cases = cases
         try:
             self.version = version("moldline")
         except PackageNotFoundError:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from servers import is_shared, serving, until
 
-from moldline.errors import FileError
+from moldline.errors import FileError, ParameterError
 from moldline.server import listening, protocol, wire
 from moldline.server.client import Client
 from moldline.server.protocol import ServerError
@@ -92,6 +92,16 @@ def answers(path):
     except ServerError:
         return False
     return True
+
+
+def test_a_token_that_others_may_read_is_refused(tmp_path):
+    path = tmp_path / "token"
+    path.write_text("secret")
+    path.chmod(0o644)
+    with pytest.raises(ParameterError, match="others may read"):
+        listening.token_in(path)
+    path.chmod(0o600)
+    assert listening.token_in(path) == "secret"
 
 
 def test_a_place_that_is_taken_is_refused(tmp_path):

@@ -119,6 +119,22 @@ def test_a_drag_across_other_triangles_shows_those_of_its_points(joined):
     np.testing.assert_array_equal(faces, joined.case.pipeline({"shift": [3.0]}).faces)
 
 
+def test_a_rider_and_another_geometry_are_asked_for_by_name(joined, tmp_path, ball):
+    ml.write(tmp_path / "ball.tri", ball)
+    rider = '\n[rider.flow]\nfile = "ball.tri"\non = "ball"\n'
+    held = opened({"text": CASE + rider, "folder": str(tmp_path)})
+    values, flow = {"lift": [0.2, 0.1]}, held.case.riders["flow"]
+    assert asked(held, "describe").header["riders"]["flow"]["points"] == len(ball.points)
+    moved = asked(held, "points", of="flow", values=values).arrays["points"]
+    np.testing.assert_array_equal(moved, flow.points(values))
+    rest = asked(held, "points", of="flow", values=values, rest=True).arrays["points"]
+    np.testing.assert_array_equal(rest, flow.geometry.points)
+    gradient = asked(held, "pullback", {"cotangent": rest}, of="flow", values=values).arrays
+    np.testing.assert_array_equal(gradient["lift"], flow.pullback(values, rest)["lift"])
+    wing = asked(joined, "points", of="wing", values={"shift": 1.0}).arrays["points"]
+    np.testing.assert_array_equal(wing, joined.case.pipeline.of("wing").points({"shift": 1.0}))
+
+
 def test_what_cannot_be_is_refused(tmp_path, ball):
     ml.write(tmp_path / "ball.tri", ball)
     held = opened({"text": CASE, "folder": str(tmp_path)})

@@ -60,6 +60,8 @@ def token_in(path: Path) -> str:
     """The token in a file; where there is none, one is made, for its owner alone to read."""
     with contextlib.suppress(FileNotFoundError):
         found = path.read_text().strip()
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            raise ParameterError(f"--token-file: others may read {path}; do: chmod 600 {path}")
         if found:
             return found
     made = secrets.token_urlsafe(24)

@@ -34,7 +34,7 @@ class RemoteCase:
     description
         What does not change with the values: path, result, units, geometries, riders, variables,
         measures, overview.
-    points, faces, tags, components, connectivity
+    points_at_rest, faces, tags, components, connectivity
         The result at the variables' own values, before the stages on it.
     """
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import moldline as ml
-from moldline.cli import parser
 from moldline.mesh.health import health
 from moldline.xddm.document import read
 from moldline.xddm.model import Design
@@ -50,16 +49,7 @@ def test_the_design_answers(programs, tmp_path):
     assert len(surfaces.columns) == 10
 
 
-def _serves_models():
-    try:
-        parser().parse_args(["serve", "model.xml"])
-    except SystemExit:
-        return False
-    return True
-
-
 @pytest.mark.slow
-@pytest.mark.skipif(not _serves_models(), reason="`moldline serve MODEL` is not there yet")
 def test_a_framework_finds_the_target_by_files_alone(programs, monkeypatch, tmp_path):
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(tmp_path))
     monkeypatch.setenv("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")

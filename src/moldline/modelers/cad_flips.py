@@ -11,16 +11,16 @@ def rounder(
     points: np.ndarray,
     uv: np.ndarray,
     kept: np.ndarray,
-    angle: float,
+    most: float,
 ) -> np.ndarray:
     """Triangles with edges turned until opposite angles are 180 degrees or less together.
 
     `kept` are pairs of nodes whose edges stay; so do those where the turned pair would fold in
-    (u, v), or would bend by more than `angle` and more than before [rad].
+    (u, v), or would lie farther than `most` from the first.
     """
     triangles = triangles.copy()
     for _ in range(ROUNDS):
-        chosen = _apart(triangles, *_to_turn(triangles, points, uv, kept, angle))
+        chosen = _apart(triangles, *_to_turn(triangles, points, uv, kept, most))
         if not len(chosen):
             break
         (one, other), (a, b, c, d) = chosen[:, :2].T, chosen[:, 2:].T
@@ -30,7 +30,7 @@ def rounder(
 
 
 def _to_turn(
-    triangles: np.ndarray, points: np.ndarray, uv: np.ndarray, kept: np.ndarray, angle: float
+    triangles: np.ndarray, points: np.ndarray, uv: np.ndarray, kept: np.ndarray, most: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Edges a-b of two triangles (a, b, c) and (b, a, d) to turn to c-d, and how much that helps.
 
@@ -48,8 +48,7 @@ def _to_turn(
     gain = _angle(points, c, a, b) + _angle(points, d, a, b) - np.pi
     is_good = (gain > 1e-6) & (ends[other, 0] == b) & (c != d)
     is_good &= (_area(uv, a, d, c) > 0) & (_area(uv, d, b, c) > 0)
-    before = _bend(points, (a, b, c), (b, a, d))
-    is_good &= _bend(points, (a, d, c), (d, b, c)) <= np.maximum(before + 1e-9, angle)
+    is_good &= _gap(points, a, b, c, d) <= most
     rows = np.stack([one // 3, other // 3, a, b, c, d], axis=1)
     return rows[is_good], gain[is_good]
 
@@ -75,9 +74,10 @@ def _area(uv: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.nda
     return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0] - 1e-6 * size
 
 
-def _bend(
-    points: np.ndarray, one: tuple[np.ndarray, ...], other: tuple[np.ndarray, ...]
+def _gap(
+    points: np.ndarray, a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray
 ) -> np.ndarray:
-    """Angle between the normals of two triangles [rad]."""
-    n, m = (np.cross(points[b] - points[a], points[c] - points[a]) for a, b, c in (one, other))
-    return np.arctan2(np.linalg.norm(np.cross(n, m), axis=1), np.sum(n * m, axis=1))
+    """How far the edges a-b and c-d pass each other: the turned pair is that far off the first."""
+    across = np.cross(points[b] - points[a], points[d] - points[c])
+    height = np.abs(np.sum(across * (points[c] - points[a]), axis=1))
+    return height / np.maximum(np.linalg.norm(across, axis=1), 1e-300)

@@ -1,5 +1,6 @@
 """The triangulation of a CAD shape that some source makes, and its points for other parameters."""
 
+import logging
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, NamedTuple
 
@@ -10,7 +11,9 @@ from ..mesh import Surface
 from .cad_sources import Given
 from .cad_tessellation import Fineness, Tessellation, tessellated
 from .cad_topology import difference, open_edges, opencascade
-from .quantities import choices
+from .quantities import Quantities, choices
+
+log = logging.getLogger("moldline.modelers")
 
 Parts = Literal["auto", "names", "colours", "solids", "faces", "one"]
 """What components are made of."""
@@ -41,6 +44,8 @@ class Form:
         asked: Asked,
     ):
         choices(components=(asked.components, Parts))
+        if parameters:
+            Quantities(parameters)  # refuses what is no number
         given = source(dict(parameters))
         self.mesh = tessellated(given.shape, given.parts, _fineness(given, asked))
         self.source, self.parts, self.scale = source, given.parts, given.scale
@@ -49,7 +54,8 @@ class Form:
         if not self.open_edges:
             _check_closed(self.mesh.faces)
         points = self.mesh.owners(given.parts) * given.scale
-        self.surface = Surface(points, self.mesh.faces, tags, names)
+        solids = np.array([face.solid for face in given.parts.faces])[self.mesh.of_face]
+        self.surface = Surface(points, _outward(points, self.mesh.faces, solids), tags, names)
 
     def __call__(self, parameters: Mapping[str, Any]) -> np.ndarray:
         given = self.source(parameters)
@@ -59,7 +65,15 @@ class Form:
                 f"at {told} the CAD shape has another topology than at first: {clause}; begin "
                 "from parameters whose shape is like this one, or keep them nearer"
             )
-        return self.mesh.owners(given.parts) * self.scale
+        placed = self.mesh.owners.placed(given.parts)
+        if placed.folded:
+            log.warning(
+                "at %s %d of %d triangles are folded over, in faces whose boundary has moved far: "
+                "make the modeler anew from parameters near these",
+                ", ".join(f"{name} = {value}" for name, value in parameters.items()),
+                placed.folded, len(self.mesh.faces),
+            )  # fmt: skip
+        return placed.points * self.scale
 
 
 def _fineness(given: Given, asked: Asked) -> Fineness:
@@ -119,13 +133,28 @@ def _components(
     return np.array([names.index(name) for name in of_faces])[mesh.of_face], names
 
 
-def _check_closed(faces: np.ndarray) -> None:
-    """Refuse triangles that are open where the shape is closed: the mesher failed there."""
+def _outward(points: np.ndarray, faces: np.ndarray, solids: np.ndarray) -> np.ndarray:
+    """Triangles of closed solids and shells turned to look out of them."""
+    faces = faces.copy()
+    for solid in np.unique(solids):
+        own = faces[solids == solid]
+        a, b, c = (points[own[:, k]] - points[own[0, 0]] for k in range(3))
+        if np.sum(a * np.cross(b, c)) < 0 and not _open_sides(own):
+            faces[solids == solid] = own[:, ::-1]
+    return faces
+
+
+def _open_sides(faces: np.ndarray) -> int:
+    """Sides of triangles without another triangle on them."""
     pairs = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     count = int(faces.max()) + 1
     there, back = np.sort(pairs @ [count, 1]), np.sort(pairs[:, ::-1] @ [count, 1])
-    if not np.array_equal(there, back):
-        odd = len(np.setxor1d(there, back)) // 2
+    return 0 if np.array_equal(there, back) else max(len(np.setxor1d(there, back)) // 2, 1)
+
+
+def _check_closed(faces: np.ndarray) -> None:
+    """Refuse triangles that are open where the shape is closed: the mesher failed there."""
+    if odd := _open_sides(faces):
         raise GeometryError(
             f"OpenCascade's triangles leave {odd} edges open on a closed shape; make sag smaller, "
             "or heal the shape"

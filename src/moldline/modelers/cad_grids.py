@@ -44,8 +44,8 @@ class Rectangle(NamedTuple):
     is_back: tuple[bool, bool, bool, bool]
 
 
-def lay_grids(parts: Topology, max_edge: float, sag: float, angle: float) -> None:
-    """Give each face that is a rectangle a grid as its triangulation."""
+def lay_grids(parts: Topology, max_edge: float, sag: float, angle: float) -> set[int]:
+    """Give each face that is a rectangle a grid as its triangulation; which those are."""
     found = (rectangle(face, number) for number, face in enumerate(parts.faces))
     rectangles = [one for one in found if one is not None]
     places = _places(parts, rectangles, max_edge, sag, angle)
@@ -53,6 +53,7 @@ def lay_grids(parts: Topology, max_edge: float, sag: float, angle: float) -> Non
         edges = [parts.faces[one.number].sides[k][0] for k in one.sides]
         own = [1 - places[e][::-1] if back else places[e] for e, back in zip(edges, one.is_back)]  # noqa: B905
         _lay(parts.faces[one.number], one, own, sag)
+    return {one.number for one in rectangles}
 
 
 def rectangle(face: Face, number: int = 0) -> Rectangle | None:
@@ -159,7 +160,7 @@ def _spread(density: np.ndarray) -> np.ndarray:
     padded = np.pad(density, wide, mode="edge")
     smooth = np.maximum(density, np.convolve(padded, kernel, "same")[wide:-wide])
     total = np.concatenate([[0.0], np.cumsum(smooth)]) / len(density)
-    count = int(np.clip(np.ceil(total[-1]), 1, MOST))
+    count = int(np.clip(np.ceil(total[-1] * (1 - 1e-9)), 1, MOST))
     places = np.linspace(0, 1, len(total))
     found = np.interp(np.linspace(0, total[-1], count + 1), total, places)
     found[[0, -1]] = 0.0, 1.0

@@ -54,7 +54,7 @@ class Meshed:
         """Distances in the shape's unit, angles in radians."""
         self.parts, self.count = parts, len(parts.vertices)
         self.lines: dict[int, Line] = {}
-        _mesh(shape, parts, max_edge, sag, angle)
+        self.gridded = _mesh(shape, parts, max_edge, sag, angle)
         self.patches = [self._patch(number) for number in range(len(parts.faces))]
 
     def numbered(self, count: int) -> np.ndarray:
@@ -147,12 +147,14 @@ class Meshed:
         return np.tile(point, (len(fractions), 1))
 
 
-def _mesh(shape: Any, parts: Topology, max_edge: float, sag: float, angle: float) -> None:
+def _mesh(shape: Any, parts: Topology, max_edge: float, sag: float, angle: float) -> set[int]:
+    """Mesh all faces; which of them have a grid."""
     occ = opencascade()
     occ.BRepTools.BRepTools.Clean_s(shape)  # a coarser mesh would be kept
-    lay_grids(parts, max_edge, sag, angle)
+    gridded = lay_grids(parts, max_edge, sag, angle)
     asked = occ.IMeshTools.IMeshTools_Parameters()
     asked.Deflection = asked.DeflectionInterior = sag
     asked.Angle = asked.AngleInterior = angle
     asked.InParallel = False
     occ.BRepMesh.BRepMesh_IncrementalMesh(shape, asked)
+    return gridded

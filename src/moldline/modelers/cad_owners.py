@@ -47,6 +47,13 @@ class EdgeNodes(NamedTuple):
     points: np.ndarray
 
 
+class Placed(NamedTuple):
+    """Points of a shape, and how many triangles are folded over in their faces' (u, v)."""
+
+    points: np.ndarray
+    folded: int
+
+
 class Owners:
     """Owners of all points; called with a shape alike the first, where they are on it."""
 
@@ -70,6 +77,10 @@ class Owners:
 
     def __call__(self, shape: Topology) -> np.ndarray:
         """The points on a shape, in its own unit."""
+        return self.placed(shape).points
+
+    def placed(self, shape: Topology) -> "Placed":
+        """The points on a shape, and how many triangles are folded there."""
         occ = opencascade()
         points = np.full((self.count, 3), np.nan)
         for number, vertex in zip(self.vertices.tolist(), shape.vertices, strict=True):
@@ -78,6 +89,7 @@ class Owners:
         for line, edge in zip(self.edges, shape.edges, strict=True):
             if len(line.points):
                 points[line.points] = along(edge, line.fractions)
+        folded = 0
         if self.size:
             border = [
                 on_border(face, nodes.sides, nodes.fractions)
@@ -87,7 +99,10 @@ class Owners:
             ends = np.cumsum([len(nodes.inner) for nodes in self.faces])[:-1]
             for face, nodes, own in zip(shape.faces, self.faces, np.split(uv, ends), strict=True):
                 points[nodes.inner] = on_surface(face, own)
-        return points
+            for nodes, outer, own in zip(self.faces, border, np.split(uv, ends), strict=True):
+                if len(own):
+                    folded += _turned(nodes, np.concatenate([outer, own]))
+        return Placed(points, folded)
 
 
 def along(edge: Edge, fractions: np.ndarray) -> np.ndarray:
@@ -122,6 +137,18 @@ def on_surface(face: Face, uv: np.ndarray) -> np.ndarray:
     """Points of a face's surface."""
     surface = opencascade().BRepAdaptor.BRepAdaptor_Surface(face.shape, False)
     return np.array([surface.Value(u, v).Coord() for u, v in uv.tolist()]).reshape(-1, 3)
+
+
+def _turned(nodes: FaceNodes, uv: np.ndarray) -> int:
+    """Triangles that are turned over, where others of their face are not."""
+    before, now = _areas(nodes.uv, nodes.triangles), _areas(uv, nodes.triangles)
+    is_other = before * now < 0
+    return int(min(is_other.sum(), (~is_other).sum()))  # a plane may be seen from its other side
+
+
+def _areas(uv: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    a, b = (uv[triangles[:, k]] - uv[triangles[:, 0]] for k in (1, 2))
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _weights(nodes: FaceNodes) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array]:

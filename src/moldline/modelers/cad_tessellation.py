@@ -66,15 +66,17 @@ class _Refined:
         )
 
     def _round(self) -> None:
-        """Turn edges inside faces; those along sides, and those at a collapsed one, stay."""
+        """Turn edges inside faces; those along sides, at a collapsed one, and of grids stay."""
         for number, patch in enumerate(self.patches):
+            if number in self.meshed.gridded:
+                continue
             sides = [np.stack([own[:-1], own[1:]], axis=1) for own in patch.sides]
             t, poles = patch.triangles, [patch.sides[k] for k, _ in self._collapsed(number)]
             if poles:
                 fan = t[np.isin(t, np.concatenate(poles)).any(axis=1)]
                 sides.append(fan[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
             kept = np.concatenate(sides)
-            patch.triangles = rounder(t, patch.points, patch.uv, kept, self.fineness.angle)
+            patch.triangles = rounder(t, patch.points, patch.uv, kept, self.fineness.sag / 4)
 
     def _halve_line(self, edge: int) -> tuple[np.ndarray, Line]:
         """Too long segments of an edge, and the points in their middles."""

@@ -26,8 +26,10 @@ EXPECTED = {
         "reshaped": 0.5230196797989195,
     },
     "ex10_common_research_model": {"volume": 842.6574000767049, "area": 869.3375385355175},
+    "ex11_running_server": {"start": 1.1418251459975473},
 }
 CLAIMS = {
+    "ex11_running_server": {"found": (0, 1e-12), "off": (0, 1e-10)},  # of a hidden wing [m, deg, %]
     "ex03_capsule_cage": {"decay": (0, 0.05)},  # of a cage vertex's effect with distance
     "ex04_forward_sweep": {"miss": (0, 1e-9)},  # of what a skeleton was asked for [deg]
     "ex05_airfoil_pilots": {

@@ -15,6 +15,7 @@ from moldline.case import load
 from moldline.errors import CaseError, GeometryError, ParameterError, TaskError
 from moldline.modelers.program import Program
 from moldline.numerics.taylor import remainder
+from moldline.workers import Processes
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
@@ -239,6 +240,14 @@ def test_a_linearisation_that_lacks_a_parameter_is_told(cache):
     maker = program(cache, "linearised", parameters={"length": 2.0, "rise": [0.3, -0.2], "w": 1.0})
     with pytest.raises(ml.errors.FileError, match="wrote no derivative by 'w', only by length"):
         jax.jvp(maker.bind(), (maker.values,), (np.eye(4)[0],))
+
+
+def test_another_executor_gives_the_same(tmp_path):
+    executor = Processes(2)
+    making = program(tmp_path, "complex", executor=executor).bind()
+    motion = jax.jvp(making, (P,), (np.eye(3)[0],))[1]
+    executor.close()
+    np.testing.assert_allclose(motion, column("length"), rtol=0, atol=1e-15)
 
 
 CASE = """

@@ -8,7 +8,7 @@ from worker_tasks import gone, present
 
 from moldline.errors import TaskError
 from moldline.workers import Processes, Threads
-from moldline.workers.programs import GivenFile, Job, ran
+from moldline.workers.programs import GivenFile, Job, ran, settled
 
 COPY = """\
 import pathlib
@@ -112,3 +112,13 @@ def test_a_cancelled_program_ends_with_what_it_started(kind, tmp_path):
         assert next(outcomes).name == "short"
         process = int(present(pid))
     assert gone(process)
+
+
+def test_what_another_machine_made_is_kept_here_too(tmp_path):
+    here = job(tmp_path / "here")
+    there = ran(job(tmp_path / "there"))
+    settled(here, there)
+    assert here.is_kept
+    assert ran(here).files == there.files
+    settled(here, there)
+    assert [p.name for p in here.store.iterdir()] == [here.key]

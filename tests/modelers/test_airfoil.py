@@ -96,7 +96,7 @@ def test_stations_may_be_given():
     ("spacing", "count", "said"),
     [
         ("dense", 9, "spacing must be one of cosine, half-cosine, uniform, curvature"),
-        ("cosine", 2, "at least 3 points, got 2"),
+        ("cosine", 2, "at least 3 points and 1048576 at most, got 2"),
         ([0.0, 0.5], 9, "ascend from 0 to 1"),
         ([0.0, 0.5, 0.5, 1.0], 9, "ascend from 0 to 1"),
         ([0.1, 0.5, 1.0], 9, "ascend from 0 to 1"),
@@ -155,6 +155,9 @@ def test_options_and_airfoils_pass_through(tmp_path):
         ("none.dat", FileError, "no such file"),
         ({"thickness": 0.1}, ParameterError, "need airfoil = its family or name"),
         ({"airfoil": "naca4", "width": 1}, ParameterError, "Naca4 has no option width; it has"),
+        ({"airfoil": "naca4", "thickness": "x"}, ParameterError, "Naca4 cannot be made of thick"),
+        ({"airfoil": "kulfan", "fit": 3}, ParameterError, "Kulfan cannot be made of fit = 3: "),
+        ({"airfoil": "2412", "points_per_side": 10**9}, ParameterError, "and 1048576 at most"),
         ({"airfoil": Naca4("0012"), "chord": 2.0}, ParameterError, "chord come too late"),
     ],
 )

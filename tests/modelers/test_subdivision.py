@@ -1,5 +1,7 @@
 """Loop's subdivision: weights, borders, creases, data and derivatives."""
 
+from pathlib import Path
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -226,6 +228,11 @@ def test_a_refined_measure_has_its_exact_derivative(ball):
 def test_other_options_are_refused(options, said, ball):
     with pytest.raises(ParameterError, match=said):
         bound(ball, **options)
+
+
+def test_rows_of_different_lengths_in_a_case_are_told():
+    with pytest.raises(ParameterError, match="creases must be numbers, in rows of one length"):
+        Subdivision.build(Path(), creases=[[0, 1], [2]])
 
 
 @pytest.mark.parametrize(

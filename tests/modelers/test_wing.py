@@ -306,6 +306,7 @@ def test_a_case_file_can_say_all_of_it():
         ({"origin": [0.0, 0.0]}, r"origin is a place \(x, y, z\)"),
         ({"chord": [1.0, float("nan"), 1.0]}, "chord must be above 0"),
         ({"twist": [0.0, float("inf"), 1.0]}, "twist must be finite"),
+        ({"chordwise": 10**8}, "chordwise = 100000000 and spanwise = 64 make more than 67108864"),
         ({"sweep_at": float("nan")}, "sweep_at must be a finite number, got nan"),
     ],
 )

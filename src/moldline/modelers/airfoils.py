@@ -77,6 +77,12 @@ def _built(
             f"{family.__name__} has no option {', '.join(unknown)}; it has "
             f"{', '.join(family.options())}"
         )
-    made = family.build(folder, **options)
+    try:
+        made = family.build(folder, **options)
+    except ParameterError:
+        raise
+    except (TypeError, ValueError, AttributeError) as error:  # words where numbers are due
+        said = ", ".join(f"{name} = {value!r}" for name, value in options.items())
+        raise ParameterError(f"{family.__name__} cannot be made of {said}: {error}") from None
     assert isinstance(made, AbstractAirfoil)
     return made

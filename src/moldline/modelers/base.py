@@ -13,6 +13,7 @@ import numpy as np
 from typing_extensions import override
 
 from .._types import Array, Points, Vector
+from ..errors import ParameterError
 from ..mesh import Geometry
 
 
@@ -87,7 +88,7 @@ class AbstractModeler(eqx.Module):
     @classmethod
     def build(cls, folder: Path, **options: Any) -> "AbstractModeler":
         """Make one from a case file's options; paths in them are relative to `folder`."""
-        arrays = {k: jnp.asarray(v) if isinstance(v, list) else v for k, v in options.items()}
+        arrays = {k: _array(k, v) if isinstance(v, list) else v for k, v in options.items()}
         return cls(**arrays)
 
     @classmethod
@@ -97,6 +98,15 @@ class AbstractModeler(eqx.Module):
         if any(p.kind is p.VAR_KEYWORD for p in own.values()):
             own = inspect.signature(cls, eval_str=True).parameters
         return {k: p for k, p in own.items() if k not in ("self", "folder")}
+
+
+def _array(name: str, given: list[Any]) -> Array:
+    try:
+        return jnp.asarray(given)
+    except (TypeError, ValueError):
+        raise ParameterError(
+            f"{name} must be numbers, in rows of one length; got {given}"
+        ) from None
 
 
 class AbstractShape(AbstractModeler):

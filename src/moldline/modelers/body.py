@@ -18,6 +18,7 @@ from .loft import Lofting, row_places
 from .quantities import (
     Numbers,
     Quantities,
+    affordable,
     ascending,
     choices,
     even_ring,
@@ -85,6 +86,7 @@ class Body(AbstractShape):
         clustering: float = 0.8,
         name: str = "body",
     ):
+        affordable(along=along, around=around)
         choices(nose=(nose, End), tail=(tail, End), loft=(loft, Lofting))
         sizes = _sizes(radius, width, height)
         each = {**sizes, "lift": lift, "exponent": exponent}

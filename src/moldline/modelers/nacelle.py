@@ -18,6 +18,7 @@ from .profile import Profile, scaled
 from .quantities import (
     Numbers,
     Quantities,
+    affordable,
     base_points_of,
     even_ring,
     placed,
@@ -89,6 +90,7 @@ class Nacelle(AbstractShape):
         spacing: Spacing | list[float] = "half-cosine",
         name: str = "nacelle",
     ):
+        affordable(chordwise=chordwise, around=around)
         self._ring(around, half, name)
         foil = airfoil_of(airfoil)
         self.profile = Profile(foil, stations(foil, chordwise, spacing), section_parameters)

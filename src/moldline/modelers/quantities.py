@@ -14,6 +14,9 @@ from ..errors import ParameterError
 Numbers: TypeAlias = float | Sequence[float] | np.ndarray
 """One number for all stations, or one each."""
 
+MOST_POINTS = 2**26
+"""More points than this have no place in memory."""
+
 
 class Quantities(eqx.Module):
     """Numbers under names, one after another.
@@ -137,6 +140,13 @@ def base_points_of(given: int, is_blunt: bool) -> int:
             f"base_points = {given}: it must be 0 or more, and 0 where the trailing edge is sharp"
         )
     return given
+
+
+def affordable(**counts: int) -> None:
+    """Refuse more points than have a place in memory."""
+    if np.prod([float(count) for count in counts.values()]) > MOST_POINTS:
+        told = " and ".join(f"{name} = {count}" for name, count in counts.items())
+        raise ParameterError(f"{told} make more than {MOST_POINTS} points; give fewer")
 
 
 def even_ring(around: int) -> int:

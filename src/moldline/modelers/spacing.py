@@ -17,6 +17,9 @@ Spacing: TypeAlias = Literal["cosine", "half-cosine", "uniform", "curvature"]
 
 NAMES = ("cosine", "half-cosine", "uniform", "curvature")
 
+MOST = 2**20
+"""Points on a side; more are a slip of the pen."""
+
 _DENSE = 2000
 """Places at which a section's curvature is looked at."""
 
@@ -36,8 +39,8 @@ def stations(
         raise ParameterError(
             f"spacing must be one of {', '.join(NAMES)}, or stations from 0 to 1; got {spacing!r}"
         )
-    if count < 3:
-        raise ParameterError(f"a side needs at least 3 points, got {count}")
+    if count < 3 or count > MOST:
+        raise ParameterError(f"a side needs at least 3 points and {MOST} at most, got {count}")
     share = np.linspace(0.0, 1.0, count)
     if spacing == "uniform":
         return share

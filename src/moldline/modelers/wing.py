@@ -19,6 +19,7 @@ from .profile import Profile, scaled
 from .quantities import (
     Numbers,
     Quantities,
+    affordable,
     ascending,
     base_points_of,
     choices,
@@ -119,6 +120,7 @@ class Wing(AbstractShape):
         name: str = "wing",
     ):
         self.sweep_at, self.twist_at, self.along, self.name = sweep_at, twist_at, along, name
+        affordable(chordwise=chordwise, spanwise=spanwise)
         finite(sweep_at=sweep_at, twist_at=twist_at)
         choices(tip=(tip, Tip), root=(root, Root), along=(along, Along), sides=(sides, (1, 2)))
         if sides == 2 and along != "y":

@@ -1,6 +1,7 @@
 """CAD shapes: closed, right in size, and with derivatives at fixed owners."""
 
 import logging
+import runpy
 import sys
 from pathlib import Path
 
@@ -284,3 +285,17 @@ def test_without_opencascade_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "OCP.OCP", None)
     with pytest.raises(ParameterError, match=r"pip install 'moldline\[step\]'"):
         Cad(script=WING, parameters=NUMBERS)
+
+
+def test_the_case_file_of_the_example_builds(occ, monkeypatch):
+    monkeypatch.setattr("moldline.registry.modeler", lambda name: Cad)
+    case = ml.load(WING.with_name("wing.toml")).pipeline
+    assert case.geometry.components == ("skin", "root", "tip")
+    assert not health(case({"sweep": 25.0})).sentences()
+
+
+def test_the_example_tells_its_numbers(occ):
+    numbers = runpy.run_path(str(WING.with_name("show.py")))["main"]()
+    assert numbers["points"] == 1942
+    assert numbers["volume"] == pytest.approx(0.142347, rel=1e-4)
+    assert numbers["error"] < 1e-5

@@ -6,7 +6,7 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
+    "AbstractBinding", "Cad", "Esp", "OpenVsp", "Program", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
     "BodySkeleton", "Bone", "Bones", "Cage", "Cloud", "Constraint", "Construction",
     "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
     "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle", "Pilots",

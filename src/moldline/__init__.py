@@ -37,11 +37,15 @@ if TYPE_CHECKING:
     from .modelers.airfoils import airfoil
     from .modelers.base import AbstractModeler
     from .modelers.body import Body
+    from .modelers.cad import Cad
+    from .modelers.esp import Esp
     from .modelers.kulfan import Kulfan
     from .modelers.naca4 import Naca4
     from .modelers.naca5 import Naca5
     from .modelers.naca_modified import NacaModified
     from .modelers.nacelle import Nacelle
+    from .modelers.openvsp import OpenVsp
+    from .modelers.program import Program
     from .modelers.subdivision import Subdivision
     from .modelers.tabulated import Tabulated
     from .modelers.trapezoidal_wing import TrapezoidalWing
@@ -64,12 +68,14 @@ _HOMES = {
     "BodySkeleton": "deformers.body_skeleton",
     "Bone": "deformers.bones",
     "Bones": "deformers.bones",
+    "Cad": "modelers.cad",
     "Cage": "deformers.cage",
     "Cloud": "mesh",
     "Constraint": "measures.base",
     "Construction": "pipeline.construction",
     "ControlVolume": "deformers.control_volume",
     "DirectSkeleton": "deformers.direct_skeleton",
+    "Esp": "modelers.esp",
     "Geometry": "mesh",
     "Grid": "mesh",
     "Hinge": "deformers.hinge",
@@ -82,9 +88,11 @@ _HOMES = {
     "Naca5": "modelers.naca5",
     "NacaModified": "modelers.naca_modified",
     "Nacelle": "modelers.nacelle",
+    "OpenVsp": "modelers.openvsp",
     "Pilots": "deformers.pilots",
     "Pipeline": "pipeline.pipeline",
     "Planform": "mesh.planform",
+    "Program": "modelers.program",
     "Section": "mesh",
     "Skeleton": "deformers.skeleton",
     "Spot": "measures.spot",

@@ -42,7 +42,7 @@ check: .venv/ready-dev  ## format, lint, types, layers, tests
 slow: .venv/ready  ## everything at full size
 	@$(BIN)/python -m pytest
 
-bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilots, modelers, unions, server, files
+bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilots, modelers, unions, programs, server, files
 	@$(BIN)/python benchmarks/deform.py
 	@$(BIN)/python benchmarks/embedding.py
 	@$(BIN)/python benchmarks/cage.py
@@ -50,6 +50,7 @@ bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilo
 	@$(BIN)/python benchmarks/pilots.py
 	@$(BIN)/python benchmarks/modelers.py
 	@$(BIN)/python benchmarks/union.py
+	@$(BIN)/python benchmarks/program.py
 	@$(BIN)/python benchmarks/server.py
 	@$(BIN)/python benchmarks/files.py
 

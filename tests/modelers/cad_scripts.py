@@ -33,6 +33,15 @@ def make(p):
     axis = gp_Ax2(gp_Pnt(p['x'], 1.0, -1.0), gp_Dir(0.0, 0.0, 1.0))
     return BRepAlgoAPI_Cut(plate, BRepPrimAPI_MakeCylinder(axis, p['radius'], 3.0).Shape()).Shape()
 """
+BRANCH = """
+from OCP.OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse
+
+def make(p):
+    along = gp_Ax2(gp_Pnt(-2.0, 0.0, 0.0), gp_Dir(1.0, 0.0, 0.0))
+    main = BRepPrimAPI_MakeCylinder(along, p['radius'], 4.0).Shape()
+    branch = BRepPrimAPI_MakeCylinder(p['bore'], p['height']).Shape()
+    return BRepAlgoAPI_Fuse(main, branch).Shape()
+"""
 ROUGH = """
 import math
 def make(p):

@@ -157,6 +157,23 @@ def test_a_hole_moves_through_its_plate_smoothly_and_folds_nothing(script):
     np.testing.assert_allclose(float(quality.signed_volume(moved)), exact, rtol=3e-3)
 
 
+def test_where_two_parts_cross_points_keep_their_share_of_the_line(script):
+    """Booleans find the line of crossing to about 1e-6, and number its places anew each time."""
+    parameters = {"radius": 1.0, "bore": 0.5, "height": 2.0}
+    cad = Cad(script=script(scripts.BRANCH), parameters=parameters, max_edge=0.4, sag=0.01)
+    assert not health(cad.geometry).sentences()
+    found = cad.differences()
+    assert found.errors.max() < 2e-3
+    for along in np.eye(3) * 0.05:
+        assert remainder(cad, cad.values, along, accuracy=1e-4).is_right
+    points, jacobian = np.asarray(cad.geometry.points), found.jacobian
+    radius = np.hypot(points[:, 1], points[:, 2])
+    crossing = (np.abs(radius - 1) < 1e-6) & (np.abs(np.hypot(*points[:, :2].T) - 0.5) < 1e-6)
+    assert crossing.sum() > 20
+    outward = np.sum(jacobian[crossing, 1:, 0] * points[crossing, 1:], axis=1)
+    np.testing.assert_allclose(outward, 1.0, atol=1e-4)
+
+
 def test_triangles_that_fold_far_from_the_first_shape_are_warned_of(script, caplog):
     cad = Cad(script=script(scripts.PLATE), parameters={"x": 1.5, "radius": 0.5}, max_edge=0.3)
     with caplog.at_level(logging.WARNING):

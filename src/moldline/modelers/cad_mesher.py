@@ -154,7 +154,8 @@ def _mesh(shape: Any, parts: Topology, max_edge: float, sag: float, angle: float
     gridded = lay_grids(parts, max_edge, sag, angle)
     asked = occ.IMeshTools.IMeshTools_Parameters()
     asked.Deflection = asked.DeflectionInterior = sag
-    asked.Angle = asked.AngleInterior = angle
+    asked.Angle, asked.AngleInterior = angle, 2 * angle  # the same crowds free-form faces
+    asked.MinSize = sag
     asked.InParallel = False
     occ.BRepMesh.BRepMesh_IncrementalMesh(shape, asked)
     return gridded

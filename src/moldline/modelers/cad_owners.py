@@ -7,6 +7,7 @@ Where the boundary's (u, v) stay, so do those inside; where it moves, as that of
 does when it grows or of a hole, they move along smoothly.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -41,10 +42,20 @@ class FaceNodes(NamedTuple):
 
 
 class EdgeNodes(NamedTuple):
-    """An edge's points inside its range: parts of the range, and the points' numbers."""
+    """An edge's points inside its range: parts of the range, and the points' numbers.
+
+    `lengths` are parts of the edge's length, where these are what stays; else None.
+    """
 
     fractions: np.ndarray
     points: np.ndarray
+    lengths: np.ndarray | None = None
+
+    def placed(self, edge: Edge) -> "EdgeNodes":
+        """Where the points are on another edge alike."""
+        if self.lengths is None:
+            return self
+        return self._replace(fractions=at_lengths(edge, self.lengths))
 
 
 class Placed(NamedTuple):
@@ -86,13 +97,14 @@ class Owners:
         for number, vertex in zip(self.vertices.tolist(), shape.vertices, strict=True):
             if number >= 0:
                 points[number] = occ.BRep.BRep_Tool.Pnt_s(vertex).Coord()
-        for line, edge in zip(self.edges, shape.edges, strict=True):
+        lines = [own.placed(edge) for own, edge in zip(self.edges, shape.edges, strict=True)]
+        for line, edge in zip(lines, shape.edges, strict=True):
             if len(line.points):
                 points[line.points] = along(edge, line.fractions)
         folded = 0
         if self.size:
             border = [
-                on_border(face, nodes.sides, nodes.fractions)
+                on_border(face, nodes.sides, self._fractions(face, nodes, lines))
                 for face, nodes in zip(shape.faces, self.faces, strict=True)
             ]
             uv = self._inner.solve(self._outer @ np.concatenate(border))
@@ -103,6 +115,60 @@ class Owners:
                 if len(own):
                     folded += _turned(nodes, np.concatenate([outer, own]))
         return Placed(points, folded)
+
+    def _fractions(self, face: Face, nodes: FaceNodes, lines: Sequence[EdgeNodes]) -> np.ndarray:
+        """Parts of edges' ranges on a face's boundary, moved as the points on the edges are."""
+        moved = nodes.fractions.copy()
+        for place, (edge, _) in enumerate(face.sides):
+            if lines[edge].lengths is not None:
+                chosen = nodes.sides == place
+                at = [np.array([0.0, *own[edge].fractions, 1.0]) for own in (self.edges, lines)]
+                moved[chosen] = at[1][np.searchsorted(at[0], nodes.fractions[chosen])]
+        return moved
+
+
+def at_lengths(edge: Edge, lengths: np.ndarray) -> np.ndarray:
+    """Parts of an edge's range at parts of its length."""
+    occ = opencascade()
+    curve = occ.BRepAdaptor.BRepAdaptor_Curve(edge.shape)
+    first, last = occ.BRep.BRep_Tool.Range_s(edge.shape)
+    point = occ.GCPnts.GCPnts_AbscissaPoint
+    whole = point.Length_s(curve, first, last)
+    return np.array(
+        [
+            (point(1e-10 * whole, curve, part * whole, first).Parameter() - first) / (last - first)
+            for part in lengths.tolist()
+        ]
+    )
+
+
+def lengths_at(edge: Edge, fractions: np.ndarray) -> np.ndarray:
+    """Parts of an edge's length at parts of its range."""
+    occ = opencascade()
+    curve = occ.BRepAdaptor.BRepAdaptor_Curve(edge.shape)
+    first, last = occ.BRep.BRep_Tool.Range_s(edge.shape)
+    places = [first, *(first + (last - first) * fractions).tolist(), last]
+    length = occ.GCPnts.GCPnts_AbscissaPoint.Length_s
+    steps = [length(curve, *ends) for ends in itertools.pairwise(places)]
+    return np.cumsum(steps)[:-1] / np.sum(steps)
+
+
+def is_marched(parts: Topology, number: int) -> bool:
+    """Whether an edge is a free curve on all its faces, as those that booleans find are.
+
+    Their parametrisation is whatever the search for them gave, so that only lengths along them
+    mean the same in another shape.
+    """
+    if parts.edges[number].kind not in ("BSplineCurve", "OtherCurve"):
+        return False
+    sides = np.linspace(0.0, 1.0, 9)
+    for face in parts.faces:
+        for edge, oriented in face.sides:
+            if edge == number and face.kind != "Plane":
+                spread = np.ptp(along_side(face, oriented, sides), axis=0)
+                if spread.min() < 1e-6 * spread.max():
+                    return False
+    return True
 
 
 def along(edge: Edge, fractions: np.ndarray) -> np.ndarray:

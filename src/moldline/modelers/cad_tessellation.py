@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import GeometryError
 from .cad_flips import rounder
 from .cad_mesher import Line, Meshed, Patch
-from .cad_owners import EdgeNodes, FaceNodes, Owners, along_side, on_surface
+from .cad_owners import EdgeNodes, FaceNodes, Owners, along_side, is_marched, lengths_at, on_surface
 from .cad_splitting import halved
 from .cad_topology import Topology
 
@@ -184,7 +184,10 @@ class _Refined:
     def _edge_nodes(self, edge: int, place: np.ndarray) -> EdgeNodes:
         line = self.lines[edge]
         inner = slice(1, -1) if self.parts.edges[edge].kind != "point" else slice(0, 0)
-        return EdgeNodes(line.fractions[inner], place[line.numbers[inner]])
+        nodes = EdgeNodes(line.fractions[inner], place[line.numbers[inner]])
+        if not is_marched(self.parts, edge):
+            return nodes
+        return nodes._replace(lengths=lengths_at(self.parts.edges[edge], nodes.fractions))
 
     def _nodes(self, number: int) -> FaceNodes:
         """The face in (u, v), where a collapsed side is drawn out to its length."""

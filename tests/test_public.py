@@ -6,14 +6,14 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "Cad", "Esp", "OpenVsp", "Program", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
-    "BodySkeleton", "Bone", "Bones", "Cage", "Cloud", "Constraint", "Construction",
-    "ControlVolume", "DirectSkeleton", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
-    "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle", "Pilots",
-    "Pipeline", "Planform", "Section", "Skeleton", "Spot", "Stage", "Subdivision", "Surface",
-    "Tabulated", "TrapezoidalWing", "Union", "Variable", "VolumeMesh", "Wing", "WingSkeleton", "airfoil", "errors",
-    "links", "load", "measures", "planform", "plot", "read", "read_sensitivities", "variable",
-    "write", "write_sensitivities",
+    "AbstractBinding", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
+    "BodySkeleton", "Bone", "Bones", "Cad", "Cage", "Cloud", "Constraint", "Construction",
+    "ControlVolume", "DirectSkeleton", "Esp", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
+    "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle",
+    "OpenVsp", "Pilots", "Pipeline", "Planform", "Program", "Section", "Skeleton", "Spot", "Stage",
+    "Subdivision", "Surface", "Tabulated", "TrapezoidalWing", "Union", "Variable", "VolumeMesh",
+    "Wing", "WingSkeleton", "airfoil", "errors", "links", "load", "measures", "planform", "plot",
+    "read", "read_sensitivities", "variable", "write", "write_sensitivities",
 }  # fmt: skip
 
 

@@ -138,6 +138,17 @@ def test_values_that_a_modeler_would_refuse_are_refused_of_variables(
         ml.Pipeline({}, [ml.Construction(modeler, {own: link})])
 
 
+def test_two_variables_cannot_both_be_what_a_parameter_measures():
+    one, other = ml.variable("one", value=4.0), ml.variable("other", value=4.0)
+    absolute = links.named(BODY, "sides", [0], absolute=True)
+    change = links.named(BODY, "sides", [0])
+    with pytest.raises(ParameterError, match="of 'one', 'other' more than one is what the same"):
+        ml.Construction(BODY, {one: absolute, other: absolute})
+    ml.Construction(BODY, {one: absolute, other: links.named(BODY, "sides", [1], absolute=True)})
+    case = ml.Pipeline({}, [ml.Construction(BODY, {one: absolute, other: change})])
+    assert np.ptp(case({"one": 5.0, "other": 0.5}).points[:, 0]) == 5.5
+
+
 def test_a_deformer_follows_what_a_modeler_moves():
     box = ml.Lattice.box((-1, -1, -1), (7, 2, 2), (4, 2, 2))
     t = ml.variable("t", size=4)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from .._types import Array, Points, Vector
@@ -124,6 +125,12 @@ def check_links(name: str, links: Mapping[Variable, Link], size: int) -> None:
                 f"stage {name!r}: the link of variable {variable.name!r} takes {link.size} "
                 f"numbers, the variable has {variable.size}; make its size {link.size}"
             )
+    rests = {v.name: np.asarray(k.rest) for v, k in links.items() if k.rest is not None}
+    if rests and np.any(np.count_nonzero([*rests.values()], axis=0) > 1):
+        raise ParameterError(
+            f"stage {name!r}: of {', '.join(map(repr, rests))} more than one is what the same "
+            "parameter measures (absolute); let the others be changes of it"
+        )
 
 
 def turned(

@@ -16,6 +16,13 @@ def serve(pipe: Connection, environment: dict[str, str]) -> None:
     os.environ.update(environment)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # whoever started it was interrupted too
     signal.signal(signal.SIGTERM, _leave)
+    try:
+        _answer_all(pipe)
+    finally:  # nothing is left to be ended: while libraries clean up, leaving would be a traceback
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+def _answer_all(pipe: Connection) -> None:
     while True:
         try:
             message = pipe.recv_bytes()

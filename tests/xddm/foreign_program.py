@@ -22,6 +22,15 @@ sys.stdout.flush()
 if mode == 1 and moved:
     sys.stderr.write("no such width\n")
     sys.exit(3)
+if mode == 7 and moved:  # one step fails while the other is under way
+    waiting = Path(__file__).parent / "waiting.txt"
+    if values["w"] > values["w0"]:
+        waiting.write_text(str(os.getpid()))
+        time.sleep(60)
+    while not waiting.exists():
+        time.sleep(0.01)
+    sys.stderr.write("no such width\n")
+    sys.exit(3)
 if mode == 2:
     time.sleep(60)
 w, t = values["w"], values["t[1,2]"]

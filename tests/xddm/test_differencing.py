@@ -1,6 +1,7 @@
 """Other people's programs, run at perturbed variables."""
 
 import math
+import os
 import shutil
 import sys
 import time
@@ -12,6 +13,7 @@ import pytest
 import moldline as ml
 from moldline.errors import FileError, GeometryError, MoldlineError
 from moldline.mesh.io.sensitivities import read_sensitivities
+from moldline.workers import Processes, Threads
 from moldline.xddm.document import Document, read
 from moldline.xddm.model import Design
 from moldline.xddm.serving import answer, served
@@ -44,7 +46,7 @@ def ask(tmp_path):
 
 
 def test_differences_are_those_of_the_program(ask, tmp_path):
-    found = ask(workers=2)
+    found = ask(executor=Threads(2))
     w, t = "Model__m__Variable__w", "Model__m__Lattice__top__Variable__t[1,2]"
     surface, columns = read_sensitivities(tmp_path / "Components.i.tri")
     x, y, z = np.array([(0.1, 0.2, 0.3), (1.1, 0.2, 0.3), (0.1, 1.2, 0.3), (0.1, 0.2, 1.3)]).T
@@ -73,6 +75,25 @@ def test_differences_are_those_of_the_program(ask, tmp_path):
     assert max(float(t) for _, t in runs) == 0.25  # never beyond its bound
     logs = sorted((tmp_path / "differences").rglob("wrapper.log"))
     assert len(logs) == 5 and all("making it" in log.read_text() for log in logs)
+
+
+def test_runs_in_other_processes_give_the_same(ask, tmp_path):
+    executor = Processes(2)
+    there = ask(executor=executor).surfaces["m"]
+    executor.close()
+    here = ask().surfaces["m"]
+    np.testing.assert_array_equal(there.surface.points, here.surface.points)
+    assert there.columns.keys() == here.columns.keys()
+    for name, column in there.columns.items():
+        np.testing.assert_array_equal(column, here.columns[name])
+
+
+def test_a_run_that_fails_ends_the_others(ask, tmp_path):
+    with pytest.raises(FileError, match="no such width"):
+        ask(mode=7, executor=Threads(4))
+    (process,) = (tmp_path / "waiting.txt").read_text().split()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(process), 0)
 
 
 def test_derivatives_of_the_program_s_own_stay(ask):
@@ -106,9 +127,9 @@ def test_one_result_may_ask_and_one_variable_may_decline(ask, tmp_path):
 @pytest.mark.parametrize(
     ("mode", "error", "message"),
     [
-        (1, FileError, r"w = 0.5 [+-]0.0001: .*(plus|minus)_0.0001: .*status 3, expected "
-            r"0; its log wrapper.log ends:\n  \| making it\n  \| \?\[31mred\n  \| no such width"),
-        (2, FileError, r"base: .*took more than 0.3 s; its log"),
+        (1, FileError, r"w = 0.5 [+-]0.0001: .*(plus|minus)_0.0001: .*status 3; "
+            r"its log wrapper.log ends:\n  \| making it\n  \| \?\[31mred\n  \| no such width"),
+        (2, FileError, r"base: .*took longer than its limit of 0.3 s; give it more; its log"),
         (3, GeometryError, r"w = 0.5 .*4 points and 3 triangles, at the base there are 4 and 4"),
         (4, GeometryError, r"w = 0.5 .*joins 2 of its 4 triangles otherwise than at the base"),
         (5, FileError, r"left no Components.i.tri"),

@@ -106,11 +106,13 @@ def run(given: argparse.Namespace) -> int:
 
 def _answer(given: argparse.Namespace) -> int:
     from ..errors import ParameterError
+    from ..workers import Threads
     from ..xddm.serving import answer
 
     if given.socket is not None or given.port is not None:
         raise ParameterError("a model is answered in this folder; --socket and --port are for none")
-    found = answer(given.model, ".", given.layout, given.limit, given.workers)
+    executor = None if given.workers is None else Threads(given.workers)
+    found = answer(given.model, ".", given.layout, given.limit, executor)
     print("\n".join(["wrote Components.i.tri and model.output.xml", *found.notes]))
     return 0
 

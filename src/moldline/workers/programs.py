@@ -8,13 +8,12 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 from ..errors import TaskError
-from .attempt import is_cancelled, overran
+from .attempt import is_cancelled
 from .locks import locked
 
 LOG = "log.txt"
@@ -148,8 +147,9 @@ def _run(job: Job) -> Ran:
             place.write_bytes(file.contents)
             place.chmod(0o755 if file.is_executable else 0o644)
         start = time.perf_counter()
-        with (directory / LOG).open("wb") as log:
-            problem = _watched(job, directory, log)
+        problem = executed(
+            job.command, directory, directory / LOG, job.limit, dict(job.environment)
+        )
         seconds = time.perf_counter() - start
         missing = [name for name in job.wanted if not (directory / name).is_file()]
         if problem is None and missing:
@@ -161,25 +161,35 @@ def _run(job: Job) -> Ran:
         shutil.rmtree(directory, ignore_errors=True)
 
 
-def _watched(job: Job, directory: Path, log: IO[bytes]) -> str | None:
-    """Run it to its end; what went wrong, if anything did."""
-    deadline = time.monotonic() + (job.limit if job.limit is not None else float("inf"))
-    try:
-        process = subprocess.Popen(
-            job.command, cwd=directory, stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-            env=os.environ | dict(job.environment),
-            start_new_session=True,  # so that what it starts itself can be ended with it
-        )  # fmt: skip
-    except OSError as error:
-        return f"cannot be started: {(error.strerror or str(error)).lower()}"
+def executed(
+    command: Sequence[str],
+    directory: Path,
+    log: Path,
+    limit: float | None = None,
+    environment: Mapping[str, str] | None = None,
+) -> str | None:
+    """Run a program in a directory to its end; what went wrong, if anything did.
+
+    What it prints goes to the log. It is ended after `limit` [s], or when its task is cancelled,
+    and in any case all that it started ends with it.
+    """
+    deadline = time.monotonic() + (limit if limit is not None else float("inf"))
+    with log.open("wb") as printed:
+        try:
+            process = subprocess.Popen(
+                command, cwd=directory, stdin=subprocess.DEVNULL, stdout=printed, stderr=printed,
+                env=os.environ | dict(environment or {}),
+                start_new_session=True,  # so that what it starts itself can be ended with it
+            )  # fmt: skip
+        except OSError as error:
+            return f"cannot be started: {(error.strerror or str(error)).lower()}"
     try:
         while True:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 status = process.wait(POLL)
                 return None if status == 0 else _ended(status)
             if time.monotonic() >= deadline:
-                assert job.limit is not None
-                return str(overran(job.limit))
+                return f"took longer than its limit of {limit:g} s; give it more"
             if is_cancelled():
                 return "was cancelled"
     finally:
@@ -188,6 +198,10 @@ def _watched(job: Job, directory: Path, log: IO[bytes]) -> str | None:
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
     """End a program and all that it started."""
+    if not hasattr(os, "killpg"):  # Windows
+        process.kill()
+        process.wait()
+        return
     for number, patience in ((signal.SIGTERM, 1.0), (signal.SIGKILL, None)):
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, number)
@@ -224,18 +238,17 @@ def _failed(job: Job, directory: Path) -> Path:
 
 
 def _told(job: Job, place: Path, problem: str) -> str:
-    lines = list(_lines(place / LOG))
-    last = "\n".join(f"    {line}" for line in lines) or "    (nothing)"
+    last = "\n".join(f"    {line}" for line in last_lines(place / LOG)) or "    (nothing)"
     return f"`{' '.join(job.command)}` {problem}; its directory: {place}; it said last:\n{last}"
 
 
-def _lines(log: Path) -> Iterator[str]:
+def last_lines(log: Path) -> list[str]:
     """The end of a log, without what might command a terminal."""
     with log.open("rb") as file:
         file.seek(max(0, log.stat().st_size - 8192))
         text = file.read().decode(errors="replace")
-    for line in text.splitlines()[-LAST:]:
-        yield "".join(c if c.isprintable() else " " for c in line)[:300]
+    lines = [line.rstrip() for line in text.splitlines() if line.strip()]
+    return ["".join(c if c.isprintable() else "?" for c in line)[:300] for line in lines[-LAST:]]
 
 
 def settled(job: Job, found: Ran) -> None:

@@ -2,20 +2,22 @@
 
 import queue
 import threading
+import time
 from collections.abc import Callable, Generator, Mapping
 from typing import Any
 
 from typing_extensions import override
 
 from ..errors import ParameterError
-from .attempt import limited
+from .attempt import GRACE, limited
 from .base import AbstractExecutor, Outcome, cores
 
 
 class Threads(AbstractExecutor):
     """Runs tasks that start programs: the work is in those processes, nothing else is copied.
 
-    A cancelled task ends when it next asks `is_cancelled`, as all that runs programs does.
+    A cancelled task ends when it next asks `is_cancelled`, as all that runs programs does; that is
+    waited for, but not long.
     """
 
     def __init__(self, count: int | None = None):
@@ -52,13 +54,19 @@ class Threads(AbstractExecutor):
                 attempt = limited(function, argument, limit, wish)
                 done.put(Outcome(number, name, attempt.value, attempt.error, attempt.seconds))
 
-        for _ in range(min(self.count, len(tasks))):
-            threading.Thread(target=work, daemon=True).start()
+        threads = [
+            threading.Thread(target=work, daemon=True) for _ in range(min(self.count, len(tasks)))
+        ]
+        for thread in threads:
+            thread.start()
         try:
             for _ in range(len(tasks)):
                 yield done.get()
         finally:
             stop.set()
+            until = time.monotonic() + GRACE  # programs that still run would outlive this process
+            for thread in threads:
+                thread.join(max(0.0, until - time.monotonic()))
 
     @override
     def close(self) -> None:

@@ -2,10 +2,9 @@
 
 import re
 import time
-from collections.abc import Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
-from threading import Event
 from typing import NamedTuple
 
 import numpy as np
@@ -14,19 +13,20 @@ from tqdm import tqdm
 from ..errors import FileError, GeometryError, MoldlineError
 from ..mesh import Surface
 from ..numerics.threads import cores
+from ..workers import AbstractExecutor, Threads
 from .asked import asking, differentiated
 from .chain import Quantity
 from .edit import Edit
 from .exchange import SURFACE, Answer, Linearised
 from .model import Design, Value
 from .steps import Stencil, stencil
-from .wrapper import LIMIT, Program, Reply, program, run
+from .wrapper import LIMIT, Program, Reply, Run, program, run
 
 FOLDER = "differences"
 """Of all runs, each in a folder of its own, within the one of the answer."""
 
 
-class _Run(NamedTuple):
+class _Step(NamedTuple):
     """A perturbed variable."""
 
     variable: Value
@@ -39,31 +39,34 @@ def differenced(
     source: Design,
     folder: Path,
     limit: float = LIMIT,
-    workers: int | None = None,
+    executor: AbstractExecutor | None = None,
 ) -> Answer:
     """The answer of a Model's Wrapper to a request, with the derivatives that it does not give.
 
     Those are differences: see `steps.stencil`. A variable with the Comment FD or oFD is always
-    differenced. `source` is the Model whose Wrapper is run; `workers` run at the same time, as
-    many as there are cores by default. All runs stay in the folder, each with its log.
+    differenced. `source` is the Model whose Wrapper is run, by default as often at the same time as
+    there are cores. All runs stay in the folder, each with its log; an executor on other machines
+    must see it, too, or they stay there.
     """
-    command, place = program(source, limit), folder / FOLDER
+    command, place = program(source, limit), folder.absolute() / FOLDER
+    workers = executor or Threads(cores())
     wanted = {value: stencil(value) for value in differentiated(design)}
-    base = run(command, design.document, place / "base")
+    first = {"base": Run(command, design.document.data, place / "base")}
+    ((_, base),) = _made(workers, design, first)
     own = _own_columns(design, base)
     lacking = [value for value in wanted if _lacks(value, own, design, base)]
-    runs = [
-        _Run(value, change, place / _folder(number, value, change))
+    steps = [
+        _Step(value, change, place / _folder(number, value, change))
         for number, value in enumerate(lacking, start=1)
         for change in wanted[value].changes
     ]
     start = time.perf_counter()
-    replies = _replies(command, design, runs, base, workers or cores())
+    replies = _replies(workers, command, design, steps, base)
     took = time.perf_counter() - start
     columns = {v.name: own[v.name] for v in wanted if v.name in own}
     slopes: dict[str, dict[str, float]] = {}
     for value in lacking:
-        found = [replies[one] for one in runs if one.variable is value]
+        found = [replies[one] for one in steps if one.variable is value]
         if value.name not in own:
             columns[value.name] = _column(base, found, wanted[value])
         slopes[value.name] = _slopes(base, found, wanted[value])
@@ -72,7 +75,7 @@ def differenced(
         design,
         {source.target.id or "model": surface},
         _results(design, base, list(wanted), slopes),
-        notes=(*_cost(runs, lacking, took, own), *_silent(design, base)),
+        notes=(*_cost(len(steps), lacking, took, own), *_silent(design, base)),
     )
     return answer.completed()
 
@@ -106,48 +109,54 @@ def _folder(number: int, value: Value, change: float) -> str:
 
 
 def _replies(
-    command: Program, design: Design, runs: Sequence[_Run], base: Reply, workers: int
-) -> dict[_Run, Reply]:
+    workers: AbstractExecutor,
+    command: Program,
+    design: Design,
+    steps: Sequence[_Step],
+    base: Reply,
+) -> dict[_Step, Reply]:
     """Run all; the first that fails stops the others."""
     quiet = Design(asking(design.document, False))
-    stop = Event()
+    named = {f"{s.variable.name} = {s.variable.value:g} {s.change:+g}": s for s in steps}
+    runs = {
+        name: Run(command, _perturbed(quiet, step), step.folder) for name, step in named.items()
+    }
+    replies: dict[_Step, Reply] = {}
     with (
-        ThreadPoolExecutor(max(1, workers), thread_name_prefix="moldline-run") as pool,
+        closing(_made(workers, design, runs)) as made,
         tqdm(total=len(runs), desc="differences", unit="runs", delay=2, leave=False) as bar,
     ):
-        jobs = {pool.submit(_reply, command, quiet, one, base, stop): one for one in runs}
-        for job in jobs:
-            job.add_done_callback(lambda _: bar.update())
-        try:
-            done, _ = wait(jobs, return_when=FIRST_EXCEPTION)
-            failed = [job for job in done if job.exception() is not None]
-        except BaseException:
-            failed = list(jobs)
-            raise
-        finally:
-            if failed:
-                stop.set()
-                for job in jobs:
-                    job.cancel()
-    for job in failed:
-        job.result()
-    return {one: job.result() for job, one in jobs.items()}
+        for name, reply in made:
+            step = named[name]
+            place = f"{design.document.path}: {name}: {step.folder}"
+            surface = reply.linearised.surface
+            _check(base.linearised.surface, surface, f"{place}/{SURFACE}")
+            for lost in base.results.keys() - reply.results.keys():
+                raise FileError(f"{place}: {lost} has no Value, at the base it has one")
+            replies[step] = reply
+            bar.update()
+    return replies
 
 
-def _reply(command: Program, quiet: Design, one: _Run, base: Reply, stop: Event) -> Reply:
-    """One run; an error says which."""
-    variable = quiet.by_name[one.variable.name]
+def _perturbed(quiet: Design, step: _Step) -> bytes:
+    """The request with one other value."""
     edit = Edit()
-    edit.set_number(variable.element, "Value", (one.variable.value or 0.0) + one.change)
-    place = f"{quiet.document.path}: {variable.name} = {one.variable.value:g} {one.change:+g}"
-    try:
-        reply = run(command, quiet.document.edited(edit), one.folder, stop)
-    except MoldlineError as problem:
-        raise FileError(f"{place}: {problem}") from None
-    _check(base.linearised.surface, reply.linearised.surface, f"{place}: {one.folder / SURFACE}")
-    for name in base.results.keys() - reply.results.keys():
-        raise FileError(f"{place}: {one.folder}: {name} has no Value, at the base it has one")
-    return reply
+    element = quiet.by_name[step.variable.name].element
+    edit.set_number(element, "Value", (step.variable.value or 0.0) + step.change)
+    return quiet.document.edited(edit).data
+
+
+def _made(
+    workers: AbstractExecutor, design: Design, runs: Mapping[str, Run]
+) -> Generator[tuple[str, Reply], None, None]:
+    """What comes of runs, as they end; an error says of which."""
+    with closing(workers.run(run, runs)) as outcomes:
+        for outcome in outcomes:
+            if isinstance(outcome.error, MoldlineError | OSError):
+                raise FileError(f"{design.document.path}: {outcome.name}: {outcome.error}")
+            if outcome.error is not None:
+                raise outcome.error
+            yield outcome.name, outcome.value
 
 
 def _check(base: Surface, other: Surface, place: str) -> None:
@@ -208,12 +217,12 @@ def _results(
 
 
 def _cost(
-    runs: Sequence[_Run], lacking: Sequence[Value], took: float, own: dict[str, np.ndarray]
+    runs: int, lacking: Sequence[Value], took: float, own: dict[str, np.ndarray]
 ) -> list[str]:
     if not lacking:
         return [f"{len(own)} derivatives are the program's own"] if own else []
     return [
-        f"{len(lacking)} variables by differences: {len(runs)} runs in {took:.3g} s, "
+        f"{len(lacking)} variables by differences: {runs} runs in {took:.3g} s, "
         f"{took / len(lacking):.3g} s per variable"
     ]
 

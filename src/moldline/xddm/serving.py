@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from ..errors import FileError, ParameterError
+from ..workers import AbstractExecutor
 from .case_answer import answered, case_of, of_case
 from .design import driven
 from .differencing import differenced
@@ -18,15 +19,15 @@ def answer(
     folder: Path | str = ".",
     layout: str | None = None,
     limit: float = LIMIT,
-    workers: int | None = None,
+    executor: AbstractExecutor | None = None,
 ) -> Answer:
     """Read `model.input.xml` in a folder, and leave the surface and `model.output.xml` there.
 
     `path` is a Model's document, which names a Case of ours or a Wrapper of somebody else's, a
     design document with Intersects, or a case file. Whatever fails raises, and leaves the folder
     without half an answer. `layout` is how derivatives of the surface are written: `both` unless
-    the document says otherwise in its attribute Layout. `limit` [s] and `workers` are for runs of
-    other programs.
+    the document says otherwise in its attribute Layout. `limit` [s] and `executor` are for runs of
+    other programs: as many at a time as there are cores, where none is given.
     """
     place, here = Path(path), Path(folder)
     if not here.is_dir():
@@ -43,7 +44,7 @@ def answer(
     else:
         source = Design(read(place))
         _check(asked, source)
-        found = served(asked, source, here, limit, workers)
+        found = served(asked, source, here, limit, executor)
         chosen = layout or source.target.get("Layout") or asked.target.get("Layout")
     deliver(found, here, _layout(chosen, place))
     return found
@@ -54,12 +55,12 @@ def served(
     source: Design,
     folder: Path,
     limit: float = LIMIT,
-    workers: int | None = None,
+    executor: AbstractExecutor | None = None,
 ) -> Answer:
     """The answer of whatever a document describes; nothing but runs of others is written."""
 
     def again(asked: Design, source: Design, folder: Path) -> Answer:
-        return served(asked, source, folder, limit, workers)
+        return served(asked, source, folder, limit, executor)
 
     if source.intersects:
         return driven(asked, source, folder, again)
@@ -72,7 +73,7 @@ def served(
         return answered(asked, source, folder, again)
     if source.target.get("Wrapper"):
         _check_loop(source)
-        return differenced(asked, source, folder, limit, workers)
+        return differenced(asked, source, folder, limit, executor)
     source.document.refuse(
         source.target,
         "expected an attribute Case with the case file behind it, a Wrapper with somebody else's "

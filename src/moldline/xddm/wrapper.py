@@ -1,15 +1,10 @@
 """A Model's Wrapper, somebody else's program: run in a folder of its own, its answer read."""
 
-import os
 import shlex
 import shutil
-import signal
-import subprocess
-import time
-from contextlib import suppress
+import uuid
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
 
 import numpy as np
 
@@ -17,8 +12,8 @@ from ..errors import FileError, ParameterError
 from ..mesh import Geometry, Surface
 from ..mesh.io import found, read, trix
 from ..mesh.io.sensitivities import read_sensitivities
+from ..workers.programs import executed, last_lines
 from .chain import Quantity, sensitivities
-from .document import Document
 from .document import read as read_document
 from .exchange import ANSWER, REQUEST, SURFACE, Linearised
 from .model import Design
@@ -27,11 +22,6 @@ LOG = "wrapper.log"
 
 LIMIT = 600.0
 """Seconds that a run may take, unless told otherwise."""
-
-TOLD = 12
-"""Lines at the end of a log that an error shows."""
-
-_PAUSE = 0.05
 
 
 @dataclass(frozen=True)
@@ -52,6 +42,25 @@ class Program:
     def __post_init__(self) -> None:
         if not 0 < self.limit < float("inf"):
             raise ParameterError(f"a time limit is a number of seconds, got {self.limit}")
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a Wrapper; it can travel to another process.
+
+    Attributes
+    ----------
+    program
+        What is run.
+    request
+        The document that it finds.
+    folder
+        Where it is run; all that it leaves stays there.
+    """
+
+    program: Program
+    request: bytes
+    folder: Path
 
 
 @dataclass(frozen=True)
@@ -87,50 +96,26 @@ def program(source: Design, limit: float = LIMIT) -> Program:
     return Program(tuple(whole), limit)
 
 
-def run(program: Program, request: Document, folder: Path, stop: Event | None = None) -> Reply:
+def run(one: Run) -> Reply:
     """Put a request into an empty folder, run the program there, and read its answer.
 
-    What it prints goes to a log in the folder. `stop` ends it from another thread.
+    It works beside the folder, which it replaces when it ends: a second worker with the same run,
+    begun where the first seemed dead, writes into none of its files.
     """
-    for name in (ANSWER, SURFACE):
-        (folder / name).unlink(missing_ok=True)
-    shutil.rmtree(folder / "design", ignore_errors=True)
-    folder.mkdir(parents=True, exist_ok=True)
-    request.save(folder / REQUEST)
-    start = time.monotonic()
-    with (folder / LOG).open("wb") as log:
-        try:
-            process = subprocess.Popen(
-                program.words,
-                cwd=folder,
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-        except OSError as problem:
-            reason = (problem.strerror or str(problem)).lower()
-            raise FileError(
-                f"{folder}: cannot start {shlex.join(program.words)}: {reason}"
-            ) from None
-        try:
-            status = _waited(process, start + program.limit, stop)
-        finally:
-            _end(process)
-    if status is None:
-        is_late = stop is None or not stop.is_set()
-        why = f"took more than {program.limit:g} s" if is_late else "was stopped"
-        raise FileError(f"{folder}: {shlex.join(program.words)} {why}{_log_end(folder)}")
-    if status != 0:
-        raise FileError(
-            f"{folder}: {shlex.join(program.words)} ended with status {status}, expected 0"
-            f"{_log_end(folder)}"
-        )
-    for name in (SURFACE, ANSWER):
-        if not (folder / name).is_file():
-            raise FileError(
-                f"{folder}: {shlex.join(program.words)} left no {name}{_log_end(folder)}"
-            )
+    folder, words = one.folder, one.program.words
+    directory = folder.with_name(f"{folder.name}-{uuid.uuid4().hex[:8]}")
+    directory.mkdir(parents=True)
+    (directory / REQUEST).write_bytes(one.request)
+    try:
+        problem = executed(words, directory, directory / LOG, one.program.limit)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        directory.rename(folder)
+    missing = [name for name in (SURFACE, ANSWER) if not (folder / name).is_file()]
+    if problem is None and missing:
+        problem = f"left no {missing[0]}"
+    if problem is not None:
+        raise FileError(f"{folder}: {shlex.join(words)} {problem}{_log_end(folder)}")
     return Reply(surface_in(folder), results_in(folder / ANSWER))
 
 
@@ -164,29 +149,7 @@ def results_in(path: Path) -> dict[str, Quantity]:
     }
 
 
-def _waited(process: subprocess.Popen, until: float, stop: Event | None) -> int | None:
-    """The status a process ended with; None if it had no more time or was stopped."""
-    while (status := process.poll()) is None:
-        if time.monotonic() > until or (stop is not None and stop.is_set()):
-            return None
-        time.sleep(_PAUSE)
-    return status
-
-
-def _end(process: subprocess.Popen) -> None:
-    """End a process and all that it started."""
-    if hasattr(os, "killpg"):
-        with suppress(ProcessLookupError, PermissionError):  # where all of them have ended
-            os.killpg(process.pid, signal.SIGKILL)
-    elif process.poll() is None:
-        process.kill()
-    process.wait()
-
-
 def _log_end(folder: Path) -> str:
     """The last lines of a run's log, as the end of a message."""
-    text = (folder / LOG).read_bytes()[-8192:].decode(errors="backslashreplace")
-    lines = [line.rstrip() for line in text.splitlines() if line.strip()][-TOLD:]
-    shown = "".join(f"\n  | {''.join(c if c.isprintable() else '?' for c in line)}"[:400]
-                    for line in lines)  # fmt: skip
-    return f"; its log {LOG} ends:{shown}" if lines else f"; its log {LOG} is empty"
+    shown = "".join(f"\n  | {line}" for line in last_lines(folder / LOG))
+    return f"; its log {LOG} ends:{shown}" if shown else f"; its log {LOG} is empty"

@@ -162,6 +162,7 @@ def test_a_saved_case_finds_its_airfoil_from_elsewhere(folder, tmp_path):
         ('modeler = "wing"', 'modeler = "wings"', "no modelers named 'wings'; installed: body"),
         ('airfoil = "flat.dat"', 'airfoil = "lost.dat"', "stage.1: .*lost.dat"),
         ('link = "each"\naxis = "z"', 'link = "named"\nparameter = "x"', "'named' is for a"),
+        ("index = [2]", "index = [2]\nscale = -1.0", "stage.1.link.0.scale: got -1.0, expected 1"),
         ("origin = [1.5, 0.0, 0.0]", "origin = [1.5, 9.0, 0.0]", "stage 'joined': .*cross"),
     ],
 )
@@ -179,6 +180,13 @@ def test_half_a_model_is_sound_and_its_components_have_the_geometries_names(caps
     told = capsys.readouterr().out
     assert "half a model: closed at y = 0 for what follows" in told
     assert "components: wing, wing tip, fuselage, symmetry plane" in told
+
+
+def test_the_mesh_that_is_checked_is_that_of_the_values(capsys):
+    assert main(["check", str(WING), "--set", "thickness=8,8,8", "--json"]) == 0
+    thin = json.loads(capsys.readouterr().out)["mesh"]["volume"]
+    assert main(["check", str(WING), "--json"]) == 0
+    assert thin < 0.7 * json.loads(capsys.readouterr().out)["mesh"]["volume"]
 
 
 def test_deform_tells_how_far_the_parts_of_a_union_move(folder, capsys):

@@ -267,6 +267,11 @@ def _link(
             f"{' or '.join(cls.__name__ for cls in serves)}, the stage has a "
             f"{type(turned).__name__}; it takes {', '.join(fit)}"
         )
+    if given.get("absolute") and table.scale != 1.0:
+        raise CaseError(
+            f"{file}: {where}.scale: got {table.scale}, expected 1: with absolute = true the "
+            "variable is what the parameter measures"
+        )
     link = function(turned, **given) * table.scale
     if not table.mirrored:
         return link

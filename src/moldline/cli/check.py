@@ -61,7 +61,7 @@ def run(given: argparse.Namespace) -> int:
         raise ParameterError("--fix mends a geometry file, not a case; give the geometry's file")
     case = load(given.case)
     chosen = values.chosen(case, given)
-    rest, plane = examine.at_rest(case.pipeline)
+    rest, plane = examine.at_rest(case.pipeline, chosen)
     mesh, mesh_lines, is_mesh_sound = _mesh(rest, given)
     if plane is not None:
         mesh_lines.insert(1, f"  half a model: closed at {plane} = 0 for what follows")

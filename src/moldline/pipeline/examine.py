@@ -126,12 +126,14 @@ class Proof:
         return self.forward.is_right and self.mismatch < 1e-6
 
 
-def at_rest(pipeline: Pipeline) -> tuple[Geometry, str | None]:
+def at_rest(pipeline: Pipeline, values: Values | None = None) -> tuple[Geometry, str | None]:
     """The result before its stages, whose mesh is to be sound; and what closes it, if anything.
 
     Half a model that a union left open in its plane of symmetry is closed there.
     """
-    geometry, made = pipeline.geometry, pipeline.branches[pipeline.result].construction
+    here = pipeline.at(values)
+    made = here.branches[here.result].construction
+    geometry = here.geometry if made is None else here.geometry.moved(_start(here, values))
     plane = made.modeler.symmetry if made and isinstance(made.modeler, Union) else None
     if plane is None or not isinstance(geometry, Surface) or topology.is_closed(geometry.faces):
         return geometry, None

@@ -34,7 +34,7 @@ class Shape:
     lines: Int[np.ndarray, "l 2"]
 
 
-def shaped(points: Any, faces: Sequence[Sequence[int]] | Array) -> Shape:
+def shaped(points: Any, faces: Sequence[Sequence[Any]] | Array) -> Shape:
     """A cage's shape, its faces turned outwards.
 
     Raises

@@ -82,8 +82,9 @@ class Pipeline(eqx.Module):
 
     def __call__(self, values: Values | None = None) -> Geometry:
         """The geometry; a variable that `values` does not name keeps its own value."""
-        here, states = self._at(self.values(values))
-        return here.geometry.moved(states[self.result])
+        full = self.values(values)
+        here, parts = self._at(full)
+        return here.geometry.moved(here._own(full, parts))
 
     @property
     def geometries(self) -> dict[str, Geometry]:
@@ -116,17 +117,20 @@ class Pipeline(eqx.Module):
 
     def holds(self, values: Values | None = None) -> bool:
         """Whether the connectivity is right for the values."""
-        return self._states(self.values(values)) is not None
+        return self._parts(self.values(values)) is not None
 
     def points(self, values: Values | None = None) -> Points:
         """The points alone; differentiable by JAX in the values."""
-        return self._at(self.values(values))[1][self.result]
+        full = self.values(values)
+        here, parts = self._at(full)
+        return here._own(full, parts)
 
     def source(self, values: Values | None = None) -> Points:
         """Points of the result's geometry before the stages on it."""
-        here, states = self._at(self.values(values))
+        full = self.values(values)
+        here, parts = self._at(full)
         own = here.branches[here.leading]
-        return own.source(self.values(values), [states[name] for name in own.of])
+        return own.source(full, [parts[name] for name in own.of])
 
     def steps(self, values: Values | None = None) -> list[Step]:
         """What moves the result's points, stage by stage."""
@@ -191,7 +195,7 @@ class Pipeline(eqx.Module):
                 found += here._motions(full, states, changes, here.result)
             return np.stack([np.asarray(motion) for motion in found], axis=-1)
         push = here._linear(full, name)
-        columns = np.empty((len(states[self.result]), 3, size))
+        columns = np.empty((*here.geometry.points.shape, size))
         for i in tqdm(range(size), desc=f"sensitivity to {name}", delay=2, leave=False):
             columns[..., i] = push(jnp.zeros(size).at[i].set(1.0))
         return columns
@@ -230,36 +234,46 @@ class Pipeline(eqx.Module):
         return (self.branches[name] for name in self.feeding)
 
     def _at(self, full: dict[str, Array]) -> tuple["Pipeline", States]:
-        """The pipeline whose connectivity is right for the values, and all points there."""
+        """The pipeline whose connectivity is right, and points of what the result is made from."""
         recent = self._recent
         for known in (self, *recent[-1:]):
-            states = known._states(full)
-            if states is not None:
-                return known, states
-        branches, states = dict(self.branches), {}
+            parts = known._parts(full)
+            if parts is not None:
+                return known, parts
+        branches, parts = dict(self.branches), {}
         for branch in self._feeders():
-            made = [states[name] for name in branch.of]
+            made = [parts[name] for name in branch.of]
             is_other = any(branches[name] is not self.branches[name] for name in branch.of)
             if branch.making is not None and (is_other or not branch.making.holds(*made)):
                 assert branch.construction is not None
-                inputs = [taken(branches[name], states[name]) for name in branch.of]
+                inputs = [taken(branches[name], parts[name]) for name in branch.of]
                 branch = branch.remade(branch.construction.bind(inputs))
                 branches[branch.name] = branch
                 log.info("%r is made anew: parts cross in other places", branch.name)
-            states[branch.name] = branch.points(full, made)
+            if branch.name != self.result:
+                parts[branch.name] = branch.points(full, made)
         recent[:] = [self._with(branches, self.result)]
-        return recent[0], states
+        return recent[0], parts
 
-    def _states(self, full: dict[str, Array]) -> States | None:
-        """All points, or None where values can be looked at and connectivity is not right."""
-        states: States = {}
+    def _parts(self, full: dict[str, Array]) -> States | None:
+        """Points of what the result is made from.
+
+        None where values can be looked at and connectivity is not right.
+        """
+        parts: States = {}
         for branch in self._feeders():
-            made = [states[name] for name in branch.of]
+            made = [parts[name] for name in branch.of]
             is_known = bool(made) and is_concrete(*made)
             if is_known and branch.making is not None and not branch.making.holds(*made):
                 return None
-            states[branch.name] = branch.points(full, made)
-        return states
+            if branch.name != self.result:
+                parts[branch.name] = branch.points(full, made)
+        return parts
+
+    def _own(self, full: dict[str, Array], parts: States) -> Array:
+        """Points of the result, from those of what it is made from."""
+        branch = self.branches[self.result]
+        return branch.points(full, [parts[name] for name in branch.of])
 
     def _linear(self, full: dict[str, Array], name: str) -> Callable[[Array], Array]:
         """The derivative by one variable, ready for many directions."""

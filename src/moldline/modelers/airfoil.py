@@ -119,6 +119,18 @@ def check_edge(trailing_edge: str) -> None:
         raise ParameterError(f"trailing_edge must be sharp or blunt, got {trailing_edge!r}")
 
 
+def check_crest(crest: float) -> None:
+    """Refuse a place of the greatest camber that is not inside the chord."""
+    if not 0 < crest < 1:
+        raise ParameterError(f"the crest must lie inside (0, 1) of chord, got {crest}")
+
+
+def check_thickness(thickness: float) -> None:
+    """Refuse a section without thickness."""
+    if not thickness > 0:
+        raise ParameterError(f"the thickness must be above 0 of chord, got {thickness}")
+
+
 def around_camber(camber: Array, slope: Array, half: Array, stations: Array) -> Array:
     """Both sides of a camber line, half the thickness off it, at a right angle to it."""
     cosine = 1 / jnp.sqrt(1 + slope**2)

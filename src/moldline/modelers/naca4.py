@@ -10,7 +10,16 @@ from typing_extensions import override
 
 from .._types import Array, Scalar, Vector
 from ..errors import ParameterError
-from .airfoil import AbstractAirfoil, Edge, Outline, around_camber, check_edge, outlined
+from .airfoil import (
+    AbstractAirfoil,
+    Edge,
+    Outline,
+    around_camber,
+    check_crest,
+    check_edge,
+    check_thickness,
+    outlined,
+)
 from .spacing import Spacing, root
 
 LAST = {"sharp": 0.1036, "blunt": 0.1015}
@@ -66,10 +75,8 @@ class Naca4(AbstractAirfoil):
         self.crest = float(own[1] if crest is None else crest)
         self.thickness = float(own[2] if thickness is None else thickness)
         check_edge(trailing_edge)
-        if not 0 < self.crest < 1:
-            raise ParameterError(f"the crest must lie inside (0, 1) of chord, got {self.crest}")
-        if not self.thickness > 0:
-            raise ParameterError(f"the thickness must be above 0 of chord, got {self.thickness}")
+        check_crest(self.crest)
+        check_thickness(self.thickness)
         self.trailing_edge = trailing_edge
         self.outline = outlined(self, points_per_side, spacing, base_points, chord)
 

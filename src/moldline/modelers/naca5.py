@@ -10,7 +10,15 @@ from typing_extensions import override
 
 from .._types import Array, Scalar, Vector
 from ..errors import ParameterError
-from .airfoil import AbstractAirfoil, Edge, Outline, around_camber, check_edge, outlined
+from .airfoil import (
+    AbstractAirfoil,
+    Edge,
+    Outline,
+    around_camber,
+    check_edge,
+    check_thickness,
+    outlined,
+)
 from .naca4 import digits, half_thickness
 from .spacing import Spacing
 
@@ -96,8 +104,7 @@ class Naca5(AbstractAirfoil):
                 f"the crest must lie between {places[0]} and {places[-1]} of chord, where the "
                 f"camber line is published, got {self.crest}"
             )
-        if not self.thickness > 0:
-            raise ParameterError(f"the thickness must be above 0 of chord, got {self.thickness}")
+        check_thickness(self.thickness)
         self.trailing_edge = trailing_edge
         self.outline = outlined(self, points_per_side, spacing, base_points, chord)
 

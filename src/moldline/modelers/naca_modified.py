@@ -10,7 +10,16 @@ from typing_extensions import override
 
 from .._types import Array, Scalar, Vector
 from ..errors import ParameterError
-from .airfoil import AbstractAirfoil, Edge, Outline, around_camber, check_edge, outlined
+from .airfoil import (
+    AbstractAirfoil,
+    Edge,
+    Outline,
+    around_camber,
+    check_crest,
+    check_edge,
+    check_thickness,
+    outlined,
+)
 from .naca4 import digits, numbered, read_four, two_parabolas
 from .naca5 import through
 from .spacing import Spacing, root
@@ -72,10 +81,8 @@ class NacaModified(AbstractAirfoil):
         chosen = [float(o if g is None else g) for o, g in zip(own, given, strict=True)]
         self.camber, self.crest, self.thickness, self.nose, self.thickest = chosen
         check_edge(trailing_edge)
-        if not 0 < self.crest < 1:
-            raise ParameterError(f"the crest must lie inside (0, 1) of chord, got {self.crest}")
-        if not self.thickness > 0:
-            raise ParameterError(f"the thickness must be above 0 of chord, got {self.thickness}")
+        check_crest(self.crest)
+        check_thickness(self.thickness)
         if not self.nose >= 0:
             raise ParameterError(f"the nose's index must be 0 or more, got {self.nose}")
         if not FALL[0, 0] <= self.thickest <= FALL[-1, 0]:

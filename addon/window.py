@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is said in the window."""
+
+import bpy
+
+
+def show(text: str) -> None:
+    """Say what is under way, in the status bar and the panels."""
+    if bpy.app.background:
+        return
+    for window in bpy.context.window_manager.windows:
+        window.workspace.status_text_set(f"Moldline: {text} ..." if text else None)
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
+def tell(problem: Exception) -> None:
+    """A sentence in the window."""
+
+    def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
+        for line in str(problem).splitlines():
+            menu.layout.label(text=line)
+
+    windows = bpy.context.window_manager.windows
+    if windows:
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.context.window_manager.popup_menu(draw, title="Moldline", icon="ERROR")
+
+
+def push_undo(name: str) -> None:
+    """Make an undo step outside an operator."""
+    windows = bpy.context.window_manager.windows
+    if windows:
+        with bpy.context.temp_override(window=windows[0]):
+            bpy.ops.ed.undo_push(message=name)

@@ -54,7 +54,7 @@ class Motions(AbstractKernel):
         given, (_, *moves) = _halves(arrays)
         if any(move is None for move in moves):
             raise ParameterError(
-                f"{self.slopes.runs.recipe.told} is known by directions only, and the points of "
+                f"{self.slopes.runs.told} is known by directions only, and the points of "
                 "its file in have too many: take `Pipeline.pullback`, which asks for those of the "
                 "variables, or jax.jvp"
             )

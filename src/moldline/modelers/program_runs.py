@@ -1,14 +1,16 @@
 """Runs of a program at many values, and the geometries they leave."""
 
+import abc
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from typing_extensions import override
 
 from .._types import Array
-from ..errors import FileError, GeometryError, TaskError
+from ..errors import FileError, GeometryError, ParameterError, TaskError
 from ..mesh import Geometry
 from ..mesh.io import read, write
 from ..mesh.io.sensitivities import read_sensitivities
@@ -26,7 +28,49 @@ class Place(NamedTuple):
     points_imaginary: np.ndarray | None = None
 
 
-class Runs:
+class AbstractRuns(abc.ABC):
+    """Runs something foreign at many values.
+
+    Attributes
+    ----------
+    given
+        The geometry that it takes, whose points others replace; None where it takes none.
+    """
+
+    given: Geometry | None
+
+    @property
+    @abc.abstractmethod
+    def labels(self) -> Sequence[str]:
+        """A name for each number that it takes."""
+
+    @property
+    @abc.abstractmethod
+    def told(self) -> str:
+        """What messages call it."""
+
+    @abc.abstractmethod
+    def points(
+        self, places: Sequence[Place], names: Sequence[str], rest: Geometry
+    ) -> list[np.ndarray]:
+        """Points at each place; `names` are what errors call the places."""
+
+    def imaginary(
+        self, places: Sequence[Place], names: Sequence[str], rest: Geometry
+    ) -> list[np.ndarray]:
+        """Imaginary parts of the points at complex places."""
+        raise ParameterError(f"{self.told} does not compute with complex numbers")
+
+    def linearised(self, place: Place, rest: Geometry) -> dict[str, np.ndarray]:
+        """Derivatives of the points that it knows itself, by label."""
+        raise ParameterError(f"{self.told} knows no derivatives itself")
+
+    @abc.abstractmethod
+    def check_seen(self, numbers: np.ndarray, moved: np.ndarray, name: str) -> None:
+        """Refuse a step that it would not see."""
+
+
+class Runs(AbstractRuns):
     """Runs a program, several at a time, and reads what they leave.
 
     Attributes
@@ -36,6 +80,9 @@ class Runs:
     given
         The geometry that it takes, whose points others replace; None where it takes none.
     """
+
+    recipe: Recipe
+    given: Geometry | None
 
     def __init__(
         self,
@@ -48,16 +95,26 @@ class Runs:
         self.recipe, self.given = recipe, given
         self._units, self._format, self._executor = units, format, executor
 
+    @property
+    @override
+    def labels(self) -> Sequence[str]:
+        return self.recipe.labels
+
+    @property
+    @override
+    def told(self) -> str:
+        return self.recipe.told
+
     def first(self, numbers: np.ndarray) -> Geometry:
         """The geometry that its own values make."""
         points = None if self.given is None else np.asarray(self.given.points)
         (job,) = self._run([self._job(Place(numbers, points))], ["its own values"])
         return self._read(job, self.recipe.output)
 
+    @override
     def points(
         self, places: Sequence[Place], names: Sequence[str], rest: Geometry
     ) -> list[np.ndarray]:
-        """Points at each place; `names` are what errors call the places."""
         found: list[np.ndarray] = []
         several = max(8, 4 * self._executor.count)  # the files in of all need memory
         for start in range(0, len(places), several):
@@ -67,10 +124,10 @@ class Runs:
                 found.append(self._checked(self._read(job, self.recipe.output), rest, name))
         return found
 
+    @override
     def imaginary(
         self, places: Sequence[Place], names: Sequence[str], rest: Geometry
     ) -> list[np.ndarray]:
-        """Imaginary parts of the points at complex places."""
         output = self.recipe.beside(self.recipe.output)
         jobs = self._run(
             [self._job(place, (self.recipe.output, output)) for place in places], names
@@ -80,8 +137,8 @@ class Runs:
             for job, name in zip(jobs, names, strict=True)
         ]
 
+    @override
     def linearised(self, place: Place, rest: Geometry) -> dict[str, np.ndarray]:
-        """Derivatives of the points that it wrote itself, by label."""
         recipe = self.recipe
         (job,) = self._run([self._job(place)], ["the linearisation"])
         file = job.place / recipe.linearised
@@ -94,6 +151,16 @@ class Runs:
                 f"{', '.join(columns) or 'nothing'}; take differences, or let it write one"
             )
         return columns
+
+    @override
+    def check_seen(self, numbers: np.ndarray, moved: np.ndarray, name: str) -> None:
+        zeros, recipe = np.zeros(len(numbers)), self.recipe
+        if recipe.parameter_text(numbers, zeros) == recipe.parameter_text(moved, zeros):
+            raise ParameterError(
+                f"{recipe.parameter_file}: {name} is written with too few digits to be seen to "
+                "change by a step: give its place in the template more, as in "
+                f"{{{name}:.17g}}, or give a larger step"
+            )
 
     def _run(self, jobs: Sequence[Job], names: Sequence[str]) -> Sequence[Job]:
         """Have all jobs' results in the store."""

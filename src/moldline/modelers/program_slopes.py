@@ -8,10 +8,9 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..errors import ParameterError
 from ..mesh import Geometry
 from ..numerics.step_control import Line, Probe, Slope, StepControl
-from .program_runs import Place, Runs
+from .program_runs import AbstractRuns, Place
 
 COMPLEX_STEP = 1e-20
 """Size of imaginary parts: its square is lost in rounding."""
@@ -74,7 +73,7 @@ class Slopes:
 
     def __init__(
         self,
-        runs: Runs,
+        runs: AbstractRuns,
         rest: Geometry,
         derivatives: str,
         trials: np.ndarray,
@@ -144,7 +143,7 @@ class Slopes:
         new = [j for j in needed if j not in columns]
         if new and self._derivatives == "linearised":
             read = self.runs.linearised(Place(numbers, points), self.rest)
-            columns |= {j: read[label] for j, label in enumerate(self.runs.recipe.labels)}
+            columns |= {j: read[label] for j, label in enumerate(self.runs.labels)}
             new = []
         lines = [self._line(j, numbers) for j in new]
         sizes = {k: float(np.abs(motion).max()) for k, motion in moves.items()}
@@ -169,7 +168,7 @@ class Slopes:
     def _line(self, j: int, numbers: np.ndarray) -> Line:
         low, high = self._bounds[0][j], self._bounds[1][j]
         below, above = max(numbers[j] - low, 0.0), max(high - numbers[j], 0.0)
-        return Line(self.runs.recipe.labels[j], j, float(self._trials[j]), below, above)
+        return Line(self.runs.labels[j], j, float(self._trials[j]), below, above)
 
     def _probed(
         self, numbers: np.ndarray, points: np.ndarray | None, probes: Sequence[Probe]
@@ -180,22 +179,13 @@ class Slopes:
             moved, shifted = numbers.copy(), points
             if isinstance(line.direction, int):
                 moved[line.direction] += offset
-                self._check_seen(numbers, moved, line.name)
+                self.runs.check_seen(numbers, moved, line.name)
             else:
                 assert points is not None
                 shifted = points + offset * line.direction
             places.append(Place(moved, shifted))
             names.append(f"{line.name} {'+' if offset > 0 else '-'} {abs(offset):.3g}")
         return self.runs.points(places, names, self.rest)
-
-    def _check_seen(self, numbers: np.ndarray, moved: np.ndarray, name: str) -> None:
-        zeros, recipe = np.zeros(len(numbers)), self.runs.recipe
-        if recipe.parameter_text(numbers, zeros) == recipe.parameter_text(moved, zeros):
-            raise ParameterError(
-                f"{recipe.parameter_file}: {name} is written with too few digits to be seen to "
-                "change by a step: give its place in the template more, as in "
-                f"{{{name}:.17g}}, or give a larger step"
-            )
 
     def _tell(self, lines: Sequence[Line], slopes: Sequence[Slope]) -> None:
         for line, slope in zip(lines, slopes, strict=True):

@@ -97,11 +97,14 @@ class StepControl:
         Standard deviation of the noise; None before it is measured.
     is_fixed
         Whether steps are the trial steps, as they are, and nothing is measured.
+    least
+        What the noise is at least, for whoever knows how values are rounded.
     """
 
-    def __init__(self, is_fixed: bool = False):
+    def __init__(self, is_fixed: bool = False, least: float = 0.0):
         self.noise: float | None = None
         self.is_fixed = is_fixed
+        self.least = least
         self._known: dict[str, tuple[float, float]] = {}
 
     def slopes(self, evaluate: Evaluate, start: Array, lines: Sequence[Line]) -> list[Slope]:
@@ -139,7 +142,8 @@ class StepControl:
             probes += [Probe(line, k * size) for k in _signed(line, _rule(line).trials)]
         values = list(evaluate(probes))
         if self.noise is None:
-            self.noise = noise_level(np.stack([origin, *values[:count]]).reshape(count + 1, -1))
+            near_by = np.stack([origin, *values[:count]]).reshape(count + 1, -1)
+            self.noise = max(noise_level(near_by), self.least)
         found, rest = {}, iter(values[count:])
         for line in lines:
             rule, size = _rule(line), _trial(line)

@@ -94,8 +94,8 @@ class Near:
         self.connectivity = told.header["connectivity"]
         self._asked = []
 
-    def send(self, op, **fields):
-        self._asked.append(asked(self._held, op, **fields))
+    def send(self, op, arrays=None, **fields):
+        self._asked.append(asked(self._held, op, arrays, **fields))
         return len(self._asked) - 1
 
     def taken(self, number):

@@ -35,8 +35,16 @@ class Cases:
         self.most = most
         self.idle = idle
         self.spare = spare
+        self._workshop: CaseProcess | None = None
         self._cases: dict[str, CaseProcess] = {}
         self._counter = itertools.count(1)
+
+    @property
+    def workshop(self) -> CaseProcess:
+        """The process that does what needs no case."""
+        if self._workshop is None:
+            self._workshop = CaseProcess({"workshop": True}, self.spare, lambda _: None)
+        return self._workshop
 
     async def open(self, opening: dict[str, Any]) -> tuple[str, CaseProcess]:
         """A new handle, and the case that it stands for."""
@@ -52,8 +60,8 @@ class Cases:
         return [case.as_dict() for case in self._cases.values()]
 
     def each(self) -> list[CaseProcess]:
-        """All of them."""
-        return list(self._cases.values())
+        """All of them, and the workshop."""
+        return [*self._cases.values(), *([self._workshop] if self._workshop else [])]
 
     async def tidy(self) -> None:
         """Stop what nobody has used for long, and have the next process ready."""
@@ -64,12 +72,13 @@ class Cases:
             if case.is_idle and not case.handles and now - case.used > min(KEPT, self.idle):
                 del self._cases[key]
                 await case.close()
-            elif case.is_idle and case.pid is not None and now - case.used > self.idle:
+        for case in self.each():
+            if case.is_idle and case.pid is not None and now - case.used > self.idle:
                 case.stop()
 
     async def close(self) -> None:
         """End all processes."""
-        ends = [self.spare.close(), *(case.close() for case in self._cases.values())]
+        ends = [self.spare.close(), *(case.close() for case in self.each())]
         await asyncio.gather(*ends)
         self._cases.clear()
 

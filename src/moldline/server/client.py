@@ -9,30 +9,19 @@ import select
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from . import places, protocol, starting, wire
+from .live import plain
 from .protocol import Message, ServerError
 from .remote import RemoteCase
 from .shared import Place
-
-
-class Address(NamedTuple):
-    """Where a server is: a Unix socket, or a host and a port."""
-
-    socket: str | None = None
-    host: str = "127.0.0.1"
-    port: int | None = None
-    token: str | None = None
-
-    def __str__(self) -> str:
-        return self.socket or f"{self.host}, port {self.port}"
+from .starting import Address
 
 
 class Client:
@@ -116,7 +105,7 @@ class Client:
 
         if not place.answers():
             starter()
-        return cls(Address(*place.address()), timeout, shared, starter)
+        return cls(place.address(), timeout, shared, starter)
 
     def ping(self) -> float:
         """Seconds that a request to the server and its answer take."""
@@ -142,6 +131,92 @@ class Client:
         """What the server has loaded, and in which processes."""
         return list(self.request("list").header["cases"])
 
+    def formats(self) -> dict[str, list[dict[str, str]]]:
+        """What can be read and written: each `ending` of files, and the `name` of the format."""
+        told = self.request("formats").header
+        return {kind: told[kind] for kind in ("read", "write")}
+
+    def read(self, path: str | PathLike[str], units: str | None = None) -> Message:
+        """A geometry from a file, in metres where `units` says what the file's are.
+
+        The header holds `kind`, `components` and `path`; arrays are `points`, and where there are
+        any `faces`, `tags`, `lines`, and data of points as `data.NAME`. Volume meshes give theirs
+        of the boundary.
+        """
+        return self.request("read", path=str(Path(path).absolute()), units=units)
+
+    def write(
+        self,
+        path: str | PathLike[str],
+        points: np.ndarray,
+        faces: np.ndarray | None = None,
+        tags: np.ndarray | None = None,
+        components: Sequence[str] = (),
+        data: Mapping[str, np.ndarray] | None = None,
+        **options: Any,
+    ) -> str:
+        """Write a surface; without faces a section, or patches whose `shapes` are given.
+
+        Options: `units` of the file, where points are in metres; `format` where the ending does
+        not tell it; `is_closed` of a section. What is there is replaced when all went well.
+        """
+        named = {"points": points, "faces": faces, "tags": tags}
+        arrays = {name: np.asarray(one) for name, one in named.items() if one is not None}
+        arrays |= {f"data.{name}": np.asarray(one) for name, one in (data or {}).items()}
+        fields: dict[str, Any] = {"components": list(components), **plain(options)}
+        fields["path"] = str(Path(path).absolute())
+        return str(self.request("write", arrays, **fields).header["path"])
+
+    def draft(
+        self,
+        text: str,
+        folder: str | PathLike[str],
+        kind: str,
+        geometry: str | PathLike[str] | None = None,
+        *,
+        bounded: bool = True,
+        **options: Any,
+    ) -> dict[str, Any]:
+        """A case's text with one more stage: `text`, `why`, the number of the `stage`, `variables`.
+
+        `kind` and its options are those of `moldline parameterise`. From an empty text it is a
+        new case of a `geometry`, a file whose `units` are an option; `on` names the geometry where
+        there are several. What the stage needs beside the case is written into `folder`. Unless
+        `bounded`, the variables have no bounds.
+        """
+        own: dict[str, Any] = {"text": text, "folder": str(Path(folder).absolute()), "kind": kind}
+        own |= {"geometry": None if geometry is None else str(geometry), "bounded": bounded}
+        own |= {name: options.pop(name) for name in ("units", "on") if name in options}
+        own["options"] = plain(options)
+        told = self.request("draft", **own).header
+        return {name: told[name] for name in ("text", "why", "stage", "variables")}
+
+    def amend(
+        self, text: str, folder: str | PathLike[str], edits: Sequence[Mapping[str, Any]]
+    ) -> dict[str, Any]:
+        """A case's `text` with some edits; comments and order stay.
+
+        An edit is {"set": path, "to": value}, {"remove": path} or {"append": path, "value": one};
+        a path is a list of keys and indices: ["stage", 0, "link"].
+        """
+        told = self.request("amend", text=text, edits=plain(edits)).header
+        return {"text": told["text"]}
+
+    def relocate(
+        self,
+        text: str,
+        folder: str | PathLike[str],
+        path: str | PathLike[str],
+        gather: bool = False,
+    ) -> dict[str, Any]:
+        """Write a case's text, whose files are named from `folder`, to a case file; gives `text`.
+
+        With `gather` files that lie in `folder` are copied beside the case file.
+        """
+        place, target = (str(Path(one).absolute()) for one in (folder, path))
+        fields: dict[str, Any] = {"text": text, "folder": place, "path": target, "gather": gather}
+        return {"text": self.request("relocate", **fields).header["text"]}
+
     def shutdown(self) -> None:
         """Stop the server, where it allows that."""
         with self._lock:
@@ -165,13 +240,13 @@ class Client:
         """Ask without waiting; the number is for `wait` or `taken`."""
         with self._lock:
             link = self.ensure()
-            if self._shares and op in protocol.ASKED_OF_CASE:
+            is_large = op in protocol.ASKED_OF_CASE + protocol.ASKED_OF_WORKSHOP
+            if self._shares and is_large:
                 self._provide(arrays)
             self._number += 1
             given = {name: protocol.plain(one) for name, one in (arrays or {}).items()}
-            is_of_case = op in protocol.ASKED_OF_CASE
-            place = self._places.take() if is_of_case else None
-            self._under_way[self._number] = is_of_case, place
+            place = self._places.take() if is_large else None
+            self._under_way[self._number] = is_large, place
             into = {} if place is None else {"into": place.as_dict()}
             entries = place.put(given) if place is not None and given else None
             header = {"id": self._number, "op": op, **fields, **into}
@@ -238,12 +313,7 @@ class Client:
     def __enter__(self) -> "Client":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def _connect(self) -> None:
@@ -293,7 +363,7 @@ class Client:
             if problem is not None:  # said of the connection as a whole
                 raise self._lost(problem)
             return
-        is_of_case, place = self._under_way.pop(number)
+        is_large, place = self._under_way.pop(number)
         try:
             arrays = protocol.arrays_of(header, body, self._places.fetch)
             self._answers[number] = problem or Message(header, arrays)
@@ -301,7 +371,7 @@ class Client:
             self._answers[number] = error
         if place is not None:
             self._places.give(place)
-        if is_of_case:
+        if is_large:
             self._places.need(len(body))
 
     def _has_news(self) -> bool:

@@ -106,6 +106,10 @@ class Connection:
             return await self._open(header)
         if name in protocol.ASKED_OF_CASE or name == "ping":
             return self._pass_on(header, pieces)
+        if name in protocol.ASKED_OF_WORKSHOP:
+            self._check_places(header)
+            workshop = self._front.cases.workshop
+            return self._submit(workshop, Job(header, pieces, self, self._answered))
         own: dict[str, Any] = {
             "list": self._list,
             "close": self._close,
@@ -114,7 +118,8 @@ class Connection:
             "shutdown": self._shutdown,
         }
         if name not in own:
-            known = ", ".join((*protocol.ASKED_OF_SERVER, *protocol.ASKED_OF_CASE))
+            every = protocol.ASKED_OF_SERVER + protocol.ASKED_OF_CASE + protocol.ASKED_OF_WORKSHOP
+            known = ", ".join(every)
             raise ServerError("unknown operation", f"no operation {name!r:.60}; there is: {known}")
         own[name](header)
 
@@ -144,7 +149,8 @@ class Connection:
         if not isinstance(handle, str) or handle not in self._cases:
             raise ServerError("unknown case", f"no case {handle!r:.60} is open here; open it")
         self._check_places(header)
-        latest = (id(self), handle, header["op"], str(header.get("of", "")))
+        what = "points" if header["op"] == "follow" else header["op"]
+        latest = (id(self), handle, what, str(header.get("of", "")))
         job = Job(header, pieces, self, self._answered, latest if header.get("latest") else None)
         self._submit(self._cases[handle], job)
 
@@ -219,9 +225,10 @@ class Connection:
 
     def _leave(self) -> None:
         for handle, case in self._cases.items():
-            case.forget(self)
             self._let_go(handle, case)
         self._cases.clear()
+        for case in self._front.cases.each():
+            case.forget(self)
         self._remove(list(self._segments.values()))
         self._segments.clear()
 

@@ -4,6 +4,7 @@ import hashlib
 import json
 import secrets
 from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from ..case import Case, load
 from ..errors import CaseError
 from ..mesh import Geometry
 from ..pipeline.pipeline import Pipeline
+from .hands import Hand, hands
 from .protocol import Message, ServerError
 
 
@@ -32,6 +34,22 @@ class Held:
         self.embedded: dict[tuple[str, str], Pipeline] = {}
         self._pipelines: dict[str, Pipeline] = {"": case.pipeline, **case.riders}
         self._connectivity: dict[str, tuple[Any, str]] = {}
+
+    @cached_property
+    def hands(self) -> dict[int, Hand]:
+        """What a hand can move, by the number of the stage."""
+        return hands(self.case)
+
+    def hand(self, ask: Message) -> Hand:
+        """What a hand moves in the stage that a request names."""
+        number = ask.header.get("stage")
+        if type(number) is not int or number not in self.hands:
+            told = f"stage {number!r:.20}" if number is not None else "no stage"
+            there = ", ".join(map(str, self.hands)) or "none"
+            raise ServerError(
+                "unknown name", f"{told} has nothing that a hand can move; stages that do: {there}"
+            )
+        return self.hands[number]
 
     def values(self, ask: Message) -> dict[str, Any]:
         """The values that a request names, all others the case's own; checked, within bounds."""

@@ -28,6 +28,14 @@ class Shape(NamedTuple):
         Whether a union had to be made anew for the values, with other triangles than the case's.
     faces, tags, components
         The triangles, the component of each and their names; None where they are known by name.
+    values
+        The variables that a pull has changed, by name; None of what was pushed.
+    miss
+        Of a pull: the largest `distance` from where the hand wants its points [m], and the labels
+        of the numbers that are held `at_bounds`.
+    measures, beyond
+        Numbers of the case's measures, and by how much they are beyond their bounds where they
+        are; None where they were not asked for.
     """
 
     points: np.ndarray
@@ -36,6 +44,10 @@ class Shape(NamedTuple):
     faces: np.ndarray | None
     tags: np.ndarray | None
     components: list[str] | None
+    values: dict[str, np.ndarray] | None = None
+    miss: dict[str, Any] | None = None
+    measures: dict[str, np.ndarray] | None = None
+    beyond: dict[str, np.ndarray] | None = None
 
 
 class Live:
@@ -47,14 +59,15 @@ class Live:
 
     AHEAD = 2
 
-    def __init__(self, case: "RemoteCase", of: str, dtype: str):
+    def __init__(self, case: "RemoteCase", of: str, dtype: str, measures: bool = False):
         self._case = case
         self._ask: dict[str, Any] = {"of": of, "dtype": dtype, "latest": True}
+        self._ask |= {"measures": True} if measures else {}
         own = Shape(case.points_at_rest, case.connectivity, False, *case.joining)
         self._seen: dict[str | None, Shape] = {case.connectivity: own}
         self._shown = case.connectivity if not of else ""
         self._under_way: list[int] = []
-        self._waiting: Values | None = None
+        self._waiting: tuple[str, dict[str, np.ndarray], dict[str, Any]] | None = None
 
     @property
     def is_busy(self) -> bool:
@@ -63,7 +76,18 @@ class Live:
 
     def push(self, values: Values) -> None:
         """These values count from now on; this does not wait."""
-        self._waiting = dict(values)
+        self._waiting = "points", {}, {"values": listed(values)}
+        self._advance()
+
+    def pull(
+        self,
+        stage: int,
+        moved: np.ndarray,
+        values: Values | None = None,
+        touched: np.ndarray | None = None,
+    ) -> None:
+        """A hand holds the points of a stage there from now on; see `RemoteCase.follow`."""
+        self._waiting = "follow", held(moved, touched), {"values": listed(values), "stage": stage}
         self._advance()
 
     def poll(self, seconds: float = 0.0) -> Shape | None:
@@ -97,9 +121,9 @@ class Live:
 
     def _advance(self) -> None:
         if self._waiting is not None and len(self._under_way) < self.AHEAD:
-            values, self._waiting = self._waiting, None
-            ask = {**self._ask, "connectivity": self._shown or ""}
-            self._under_way.append(self._case.send("points", values=listed(values), **ask))
+            (op, arrays, fields), self._waiting = self._waiting, None
+            ask = {**self._ask, **fields, "connectivity": self._shown or ""}
+            self._under_way.append(self._case.send(op, arrays, **ask))
 
     def _collected(self) -> Shape | None:
         latest: Shape | None = None
@@ -129,12 +153,13 @@ class Live:
             return shape and shape._replace(faces=None, tags=None, components=None)
         self._shown = shape.connectivity
         known = self._seen.get(shape.connectivity, shape)
-        return known._replace(points=shape.points, is_made_anew=shape.is_made_anew)
+        return shape._replace(faces=known.faces, tags=known.tags, components=known.components)
 
 
 def shape_of(told: Message) -> Shape:
-    """What an answer to `points` says."""
+    """What an answer to `points` or `follow` says."""
     fields, arrays = told
+    beyond = fields.get("beyond")
     return Shape(
         arrays["points"],
         fields.get("connectivity"),
@@ -142,7 +167,31 @@ def shape_of(told: Message) -> Shape:
         arrays.get("faces"),
         arrays.get("tags"),
         fields.get("components"),
+        None if "miss" not in fields else _named(arrays, "values."),
+        fields.get("miss"),
+        None if beyond is None else _named(arrays, "measures."),
+        None if beyond is None else {name: np.asarray(one) for name, one in beyond.items()},
     )
+
+
+def _named(arrays: Mapping[str, np.ndarray], begin: str) -> dict[str, np.ndarray]:
+    """Those arrays whose names begin so, by the rest of their names."""
+    return {k.removeprefix(begin): one for k, one in arrays.items() if k.startswith(begin)}
+
+
+def held(moved: np.ndarray, touched: np.ndarray | None) -> dict[str, np.ndarray]:
+    """Arrays of a request to follow a hand."""
+    given = {"moved": np.asarray(moved, float)}
+    return given if touched is None else {**given, "touched": np.asarray(touched, bool)}
+
+
+def plain(given: Any) -> Any:
+    """What a header can hold: arrays are lists, and so are tuples."""
+    if isinstance(given, Mapping):
+        return {str(name): plain(one) for name, one in given.items()}
+    if isinstance(given, list | tuple):
+        return [plain(one) for one in given]
+    return given.tolist() if isinstance(given, np.ndarray | np.generic) else given
 
 
 def listed(values: Values | None) -> dict[str, Any]:

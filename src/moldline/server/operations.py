@@ -6,9 +6,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..mesh import Geometry, Surface
+from ..parameters.variable import Variable
 from ..pipeline.pipeline import Pipeline
 from . import description
-from .checks import checked
+from .checks import checked, point_normals
+from .fitting import fitted
 from .held import Held, array, numbers, text
 from .protocol import Message, ServerError
 
@@ -49,7 +51,52 @@ def points(held: Held, ask: Message) -> Message:
         shape = pipeline.geometry
         found = _source(pipeline, full) if ask.header.get("rest") else pipeline.points(full)
     fields, arrays = _joining(held, ask, pipeline, shape)
+    if ask.header.get("measures"):
+        own = measures(held, ask)
+        fields["beyond"] = own.header["beyond"]
+        arrays |= {f"measures.{name}": one for name, one in own.arrays.items()}
     return Message(fields, {"points": _as_asked(ask, found), **arrays})
+
+
+def handles(held: Held, ask: Message) -> Message:
+    """What a hand can move, before and at some values."""
+    full = held.values(ask)
+    told: list[dict[str, Any]] = []
+    arrays: dict[str, np.ndarray] = {}
+    for i, hand in enumerate(held.hands.values()):
+        shape = (-1, 3, 3) if hand.kind == "bones" else (-1, 3)
+        arrays[f"lines.{i}"] = np.asarray(hand.lines, np.int32).reshape(-1, 2)
+        arrays[f"rest.{i}"] = hand.rest(full).reshape(shape)
+        arrays[f"moved.{i}"] = hand.places(full).reshape(shape)
+        arrays[f"frozen.{i}"] = hand.frozen
+        told.append(hand.as_dict())
+    return Message({"handles": told}, arrays)
+
+
+def follow(held: Held, ask: Message) -> Message:
+    """Values that bring what a hand moves where it wants it, and the points for them."""
+    hand, full = held.hand(ask), held.values(ask)
+    rest = hand.rest(full)
+    count, parts = len(hand.labels), len(rest) // max(len(hand.labels), 1)
+    shape = (count, 3, 3) if hand.kind == "bones" else (count, 3)
+    moved = array(ask, "moved", shape).reshape(-1, 3)
+    touched = None
+    if "touched" in ask.arrays:
+        touched = np.repeat(array(ask, "touched", (count,)) != 0, parts)
+    numbers, distance, at_bounds = fitted(
+        hand.reach,
+        hand.reach.numbers(full),
+        moved,
+        touched,
+        lambda x: hand.places({**full, **hand.reach.named(x)}),
+        lambda x: hand.slopes({**full, **hand.reach.named(x)}),
+        hand.is_linear,
+    )
+    changed = hand.reach.named(numbers)
+    shown = points(held, ask._replace(header={**ask.header, "values": {**full, **changed}}))
+    miss = {"distance": distance, "at_bounds": at_bounds}
+    own = {f"values.{name}": one for name, one in changed.items()}
+    return Message({**shown.header, "miss": miss}, {**shown.arrays, **own})
 
 
 def pushforward(held: Held, ask: Message) -> Message:
@@ -69,13 +116,31 @@ def pullback(held: Held, ask: Message) -> Message:
 
 def sensitivity(held: Held, ask: Message) -> Message:
     """Derivative of every point by every number of one variable."""
-    name, pipeline = text(ask, "variable"), held.pipeline(ask)
-    if name not in pipeline.variables:
-        there = ", ".join(pipeline.variables)
-        raise ServerError("unknown name", f"no variable {name!r:.60}; there is: {there}")
-    columns = pipeline.sensitivity(held.values(ask), name)
-    labels = pipeline.variables[name].labels()
-    return Message({"labels": labels}, {"sensitivity": _as_asked(ask, columns)})
+    pipeline = held.pipeline(ask)
+    variable = _variable(pipeline, text(ask, "variable"))
+    columns = pipeline.sensitivity(held.values(ask), variable.name)
+    return Message({"labels": variable.labels()}, {"sensitivity": _as_asked(ask, columns)})
+
+
+def colour(held: Held, ask: Message) -> Message:
+    """How far each point moves for a unit of one number: along the outward normal, or at all."""
+    pipeline, full, how = held.pipeline(ask), held.values(ask), text(ask, "how", "normal")
+    variable = _variable(pipeline, text(ask, "variable"))
+    number = ask.header.get("number", 0)
+    if type(number) is not int or not 0 <= number < variable.size:
+        raise ServerError(
+            "parameter",
+            f"{variable.name!r} has {variable.size} numbers, counted from 0, got {number!r:.20}",
+        )
+    if how not in ("normal", "size"):
+        raise ServerError("parameter", f"'how' is 'normal' or 'size', got {how!r:.20}")
+    motion = np.asarray(pipeline.pushforward(full, {variable.name: np.eye(variable.size)[number]}))
+    shape = pipeline(full)
+    if how == "normal" and isinstance(shape, Surface):
+        found = np.einsum("ij,ij->i", motion, point_normals(shape))
+    else:
+        how, found = "size", np.linalg.norm(motion, axis=1)
+    return Message({"how": how}, {"colour": found})
 
 
 def measures(held: Held, ask: Message) -> Message:
@@ -129,7 +194,8 @@ def save(held: Held, ask: Message) -> Message:
 def check(held: Held, ask: Message) -> Message:
     """Health of the present shape; with `deep`, folds of space and a proof of derivatives."""
     pipeline, full = held.pipeline(ask), held.values(ask)
-    return Message(checked(pipeline, full, bool(ask.header.get("deep"))), {})
+    report, bad = checked(pipeline, full, bool(ask.header.get("deep")))
+    return Message(report, {"bad_faces": bad})
 
 
 def ping(held: Held, ask: Message) -> Message:
@@ -146,10 +212,17 @@ def forget(held: Held, ask: Message) -> Message:
 OPERATIONS: dict[str, Operation] = {
     one.__name__: one
     for one in (
-        describe, geometry, values, points, pushforward, pullback, sensitivity, measures, nets,
-        embed, save, check, ping, forget,
+        describe, geometry, values, points, handles, follow, pushforward, pullback, sensitivity,
+        colour, measures, nets, embed, save, check, ping, forget,
     )
 }  # fmt: skip
+
+
+def _variable(pipeline: Pipeline, name: str) -> Variable:
+    if name not in pipeline.variables:
+        there = ", ".join(pipeline.variables)
+        raise ServerError("unknown name", f"no variable {name!r:.60}; there is: {there}")
+    return pipeline.variables[name]
 
 
 def _is_joined(pipeline: Pipeline) -> bool:

@@ -31,9 +31,13 @@ ALIGNMENT = 8
 ASKED_OF_SERVER = ("ping", "list", "share", "unshare", "open", "close", "shutdown")
 ASKED_OF_CASE = (
     "geometry", "values", "points", "pushforward", "pullback", "sensitivity", "measures", "nets",
-    "embed", "save", "check",
+    "embed", "save", "check", "handles", "follow", "colour",
 )  # fmt: skip
-"""Operations; `ping` with a case goes through to the process that holds it."""
+ASKED_OF_WORKSHOP = ("formats", "read", "write", "draft", "amend", "relocate")
+"""Operations; `ping` with a case goes through to the process that holds it.
+
+Those of the workshop need no case: one process for all clients does them.
+"""
 
 Buffer: TypeAlias = bytes | bytearray | memoryview
 

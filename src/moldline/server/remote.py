@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from .live import Live, Shape, Values, listed, shape_of
+from .live import Live, Shape, Values, held, listed, shape_of
 from .protocol import Message, ServerError
 
 if TYPE_CHECKING:
@@ -21,6 +21,40 @@ class Net(NamedTuple):
     rest: np.ndarray
     moved: np.ndarray
     is_hidden: bool
+
+
+class Handle(NamedTuple):
+    """What a hand can move in a stage.
+
+    Attributes
+    ----------
+    stage
+        Its number among the stages of the case file, from 0.
+    name, deformer, on
+        Of the stage, and the geometry that it acts on.
+    kind
+        "net", control points; "bones"; or "marks", places that pilots hold.
+    lines
+        Pairs of points that lines join, (l, 2).
+    rest, moved
+        Places before and at the values, (p, 3); of bones head, tail and a point beside, (b, 3, 3).
+    frozen
+        Which points, or bones, never move.
+    labels
+        A name for each: bones' and pilots' own, indices of control points as links take them,
+        such as "0,2,1".
+    """
+
+    stage: int
+    name: str
+    deformer: str
+    on: str
+    kind: str
+    lines: np.ndarray
+    rest: np.ndarray
+    moved: np.ndarray
+    frozen: np.ndarray
+    labels: list[str]
 
 
 class RemoteCase:
@@ -148,6 +182,52 @@ class RemoteCase:
             for i, is_hidden in enumerate(told.header["hidden"])
         ]
 
+    def handles(self, values: Values | None = None) -> list[Handle]:
+        """What a hand can move, by stage: those on the result and on what it is made from."""
+        told = self.request("handles", values=listed(values))
+        own = ("lines", "rest", "moved", "frozen")
+        return [
+            Handle(**{**one, **{name: told.arrays[f"{name}.{i}"] for name in own}})
+            for i, one in enumerate(told.header["handles"])
+        ]
+
+    def follow(
+        self,
+        stage: int,
+        moved: np.ndarray,
+        values: Values | None = None,
+        of: str = "",
+        dtype: str = "<f8",
+        touched: np.ndarray | None = None,
+        connectivity: str | None = None,
+    ) -> Shape:
+        """Values for which a handle's points come closest to where a hand wants them, and points.
+
+        The stage's own numbers change from `values` by the least, within their bounds: where it
+        has links `each`, `named` or `controls` those alone. What the hand moved comes first,
+        `touched` says which points, or bones, that is; without it, those that are not where
+        `values` put them. The others then stay as far as they can.
+        """
+        known = connectivity or (self.connectivity if not of else "") or ""
+        ask: dict[str, Any] = {"values": listed(values), "of": of, "dtype": dtype, "stage": stage}
+        return shape_of(self.request("follow", held(moved, touched), connectivity=known, **ask))
+
+    def colour(
+        self,
+        values: Values | None,
+        variable: str,
+        number: int = 0,
+        of: str = "",
+        how: str = "normal",
+    ) -> np.ndarray:
+        """How far each point moves for a unit of one number of a variable, (n,).
+
+        `how` "normal" is along the outward normal, below zero where it moves inward; "size" is the
+        length of the motion, as always of what is no surface of triangles.
+        """
+        ask: dict[str, Any] = {"variable": variable, "number": number, "of": of, "how": how}
+        return self.request("colour", values=listed(values), **ask).arrays["colour"]
+
     def embed(self, points: np.ndarray, name: str, on: str = "") -> str:
         """Tie the deformation to other points, (n, 3); the name then serves as `of`."""
         own = np.array(points, float)
@@ -156,16 +236,23 @@ class RemoteCase:
         return name
 
     def check(self, values: Values | None = None, of: str = "", deep: bool = False) -> dict:
-        """Whether the shape is sound; with `deep`, also space and derivatives."""
-        return self.request("check", values=listed(values), of=of, deep=deep).header
+        """Whether the shape is sound; with `deep`, also space and derivatives.
+
+        `bad_faces` holds numbers of the faces that are not.
+        """
+        told = self.request("check", values=listed(values), of=of, deep=deep)
+        return {**told.header, **told.arrays}
 
     def save(self, path: str | PathLike[str], values: Values | None = None) -> None:
         """Write the case file with new values."""
         self.request("save", path=str(Path(path).absolute()), values=listed(values))
 
-    def live(self, of: str = "", dtype: str = "<f8") -> "Live":
-        """For a drag: values are given as they come, and only the latest count."""
-        return Live(self, of, dtype)
+    def live(self, of: str = "", dtype: str = "<f8", measures: bool = False) -> "Live":
+        """For a drag: values are given as they come, and only the latest count.
+
+        With `measures` each shape also has those of the case.
+        """
+        return Live(self, of, dtype, measures)
 
     def close(self) -> None:
         """Close the case."""
@@ -195,9 +282,9 @@ class RemoteCase:
             self._open()
         return self._handle
 
-    def send(self, op: str, **fields: Any) -> int:
+    def send(self, op: str, arrays: Mapping[str, np.ndarray] | None = None, **fields: Any) -> int:
         """Ask without waiting."""
-        return self._client.send(op, case=self.handle(), **fields)
+        return self._client.send(op, arrays, case=self.handle(), **fields)
 
     def taken(self, number: int) -> Message | None:
         """The answer if it is there."""

@@ -18,6 +18,18 @@ _STARTED: list[subprocess.Popen] = []
 """Servers that go on when their client leaves; they are looked after for as long as we are here."""
 
 
+class Address(NamedTuple):
+    """Where a server is: a Unix socket, or a host and a port."""
+
+    socket: str | None = None
+    host: str = "127.0.0.1"
+    port: int | None = None
+    token: str | None = None
+
+    def __str__(self) -> str:
+        return self.socket or f"{self.host}, port {self.port}"
+
+
 class Place(NamedTuple):
     """Where a server is, or is to be: its socket, or the file that tells its port."""
 
@@ -33,12 +45,12 @@ class Place(NamedTuple):
         kind = "sock" if is_socket else "json"
         return cls(folder() / f"moldline-{PROTOCOL}.{kind}", is_socket)
 
-    def address(self) -> tuple[str | None, str, int | None, str | None]:
-        """Socket, host, port and token."""
+    def address(self) -> Address:
+        """Of the server that is there."""
         if self.is_socket:
-            return str(self.path), "", None, None
+            return Address(str(self.path))
         told = json.loads(self.path.read_text())
-        return None, told["host"], told["port"], told["token"]
+        return Address(None, told["host"], told["port"], told["token"])
 
     def answers(self) -> bool:
         """Whether somebody listens there."""

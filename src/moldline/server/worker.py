@@ -85,21 +85,25 @@ def _warm() -> None:
     import tqdm
 
     tqdm.tqdm.set_lock(threading.RLock())  # a killed process would leave its own one behind
-    from . import operations  # noqa: F401
+    from . import operations, workshop  # noqa: F401
 
 
-def _loaded(header: dict[str, Any]) -> "Held":
+def _loaded(header: dict[str, Any]) -> "Held | None":
+    """The case that is to be held; none by the workshop."""
     from .held import opened
 
-    return opened(header)
+    return None if "workshop" in header else opened(header)
 
 
 def _answer(held: "Held | None", header: dict[str, Any], body: Buffer, own: Segments) -> Message:
     from .operations import OPERATIONS
+    from .workshop import WORKSHOP
 
+    ask = Message(header, protocol.arrays_of(header, body, own.fetch))
+    if header["op"] in WORKSHOP:
+        return WORKSHOP[header["op"]](ask)
     assert held is not None
-    arrays = protocol.arrays_of(header, body, own.fetch)
-    return OPERATIONS[header["op"]](held, Message(header, arrays))
+    return OPERATIONS[header["op"]](held, ask)
 
 
 def _encoded(header: dict[str, Any], answer: Message, segments: Segments) -> list[Buffer]:

@@ -1,0 +1,1 @@
+"""A case's text with one more stage."""

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Changes of the case's text, asked of moldline, which keeps comments and refuses what is wrong."""
+
+from collections.abc import Callable
+from typing import Any
+
+from . import edits, project, session, view
+
+Make = Callable[[Any], edits.Edits]
+"""Edits, made in a thread beside Blender with the client at hand."""
+
+
+def amend(
+    operator: Any,
+    context: Any,
+    what: str,
+    make: Make | edits.Edits,
+    then: Callable[[Any], None] | None = None,
+) -> set[str]:
+    """Change the case and open it again; what is wrong is told as the operator's error.
+
+    `then` is called with the scene when the case is open again.
+    """
+    scene = context.scene
+    if scene.moldline.text is None:
+        operator.report({"ERROR"}, "there is no case yet; add a parameterisation first")
+        return {"CANCELLED"}
+    name, text, folder = scene.name, scene.moldline.text.as_string(), scene.moldline.folder
+    problems: list[str] = []
+
+    def work(client: Any) -> str:
+        wanted = make(client) if callable(make) else make
+        return client.amend(text, folder, wanted)["text"]
+
+    def done() -> None:
+        own = _scene(name)
+        view.sync(own)
+        if then is not None:
+            then(own)
+        view.looked(own)
+        view.redraw()
+
+    def taken(new: str) -> None:
+        project.update_text(_scene(name), new, then=done)
+
+    def failed(problem: Exception) -> None:
+        problems.append(str(problem))
+
+    session.run(work, then=taken, failed=failed, what=what)
+    return finished(operator, problems)
+
+
+def finished(operator: Any, problems: list[str]) -> set[str]:
+    """How an operator ends, by the problems that are known by then."""
+    if problems:
+        operator.report({"ERROR"}, problems[0])
+        return {"CANCELLED"}
+    return {"FINISHED"}
+
+
+def _scene(name: str) -> Any:
+    import bpy
+
+    return bpy.data.scenes[name]

@@ -4,7 +4,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from test_against_blender import PYTHON, ROOT, imports_bpy  # noqa: F401  a fixture
+from blender_process import PYTHON, ROOT
 
 import moldline as ml
 
@@ -37,7 +37,7 @@ np.save(folder + "/seen.npy", np.array(points))
 
 
 @pytest.mark.blender
-def test_a_lattice_modifier_becomes_a_case(imports_bpy, tmp_path):  # noqa: F811
+def test_a_lattice_modifier_becomes_a_case(imports_bpy, tmp_path):
     script = ROOT / "examples/from_blender/lattice_to_case.py"
     (tmp_path / "scene.py").write_text(f"SCRIPT = {str(script)!r}\n{SCENE}")
     command = [PYTHON, tmp_path / "scene.py", tmp_path]

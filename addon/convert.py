@@ -198,9 +198,7 @@ def colour(mesh: bpy.types.Mesh, rgba: np.ndarray | None) -> None:
         return
     given = np.ascontiguousarray(rgba, np.float32)
     if given.shape != (len(mesh.vertices), 4):
-        raise ValueError(
-            f"{mesh.name}: colours are ({len(mesh.vertices)}, 4), got {given.shape}"
-        )
+        raise ValueError(f"{mesh.name}: colours are ({len(mesh.vertices)}, 4), got {given.shape}")
     held = _attribute(mesh, COLOUR, "FLOAT_COLOR", "POINT")
     if len(given):
         held.data.foreach_set("color", given.reshape(-1))

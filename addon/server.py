@@ -68,5 +68,3 @@ def with_remedy(error: ServerError) -> str:
             )
         return f"moldline is not running any more ({said}); press 'Restart'"
     return said
-
-

@@ -48,6 +48,7 @@ class _State:
     where: Where | None = None
     is_starting: bool = False
     why: str = ""
+    generation: int = 0
     epoch: int = 0
     under_way: list[str] = field(default_factory=list)
     thread: threading.Thread | None = None
@@ -65,10 +66,10 @@ def state() -> str:
     """'no environment', 'stopped', 'starting', 'ready' or 'failed'."""
     if _now.is_starting or environment.is_making():
         return "starting"
-    if _now.client is not None:
-        return "ready"
     if _now.why:
         return "failed"
+    if _now.client is not None:
+        return "ready"
     return "stopped" if environment.is_made() else "no environment"
 
 
@@ -112,7 +113,7 @@ def busy() -> str:
 
 def client() -> Client:
     """The client, where moldline is running."""
-    if _now.client is None:
+    if _now.client is None or _now.why:
         raise Problem(sentence(), "disconnected")
     return _now.client
 
@@ -164,6 +165,8 @@ def start(then: Callable[[], None] | None = None) -> None:
 def restart(then: Callable[[], None] | None = None) -> None:
     """Stop moldline and start it again; cases that are open are opened again when next asked."""
     own = _now.client
+    if own is not None and busy():  # what is under way is given up
+        _shut(own)
 
     def work(found: Client) -> None:
         if found is not own:  # it was not running, so this one is new
@@ -178,8 +181,7 @@ def restart(then: Callable[[], None] | None = None) -> None:
 def stop() -> None:
     """Stop moldline."""
     if _now.client is not None:
-        with contextlib.suppress(ServerError, OSError):
-            _shut(_now.client)
+        _shut(_now.client)
     forget()
 
 
@@ -190,7 +192,7 @@ def forget() -> None:
             if one is not None:
                 one.close()
         _now.client = _now.live = _now.where = None
-        _now.why = ""
+        _now.why, _now.generation = "", 0
 
 
 def met(error: Exception) -> Problem:
@@ -203,7 +205,6 @@ def met(error: Exception) -> Problem:
         return Problem(f"{type(error).__name__}: {error}", "internal")
     problem = Problem(with_remedy(error), error.code)
     if error.code in ("disconnected", "version"):
-        forget()
         _now.why = str(problem)
         _done.put(lambda: [tell(problem) for tell in list(_now.lost)])
         wake()
@@ -251,8 +252,9 @@ def _made(problem: str) -> None:
 
 def _shut(found: Client) -> None:
     """Stop the server behind a client, and wait until it is gone."""
-    with contextlib.suppress(ServerError):  # it may be gone already, or not ours to stop
-        found.request("shutdown", timeout=10.0)
+    with contextlib.suppress(ServerError, OSError):  # it may be gone already, or not ours to stop
+        other = Client(found.address, timeout=10.0, shared=False)  # the other one may be busy
+        other.shutdown()
     where = Place.of(_now.where.socket if _now.where else None)
     deadline = time.monotonic() + 10.0
     while where.answers() and time.monotonic() < deadline:
@@ -262,16 +264,27 @@ def _shut(found: Client) -> None:
 def _connected(where: Where) -> Client:
     """The client; moldline is started where it is not running."""
     with _connecting:
-        if _now.client is not None and _now.where == where:
-            return _now.client
-        forget()
-        _now.is_starting = True
+        _now.is_starting = _now.client is None or bool(_now.why)
         try:
-            _now.client, _now.where = where.start(), where
+            if _now.client is not None and _now.where == where:
+                _now.client.ensure()  # the same client again, so that its cases stay of use
+            else:
+                forget()
+                _now.client, _now.where = where.start(), where
         finally:
             _now.is_starting = False
-        _done.put(lambda: [tell() for tell in list(_now.ready)])
+        _now.why = ""
+        _look()
         return _now.client
+
+
+def _look() -> None:
+    """Tell who wants to know that moldline is there, or there again."""
+    found = _now.client.generation if _now.client else 0
+    if found != _now.generation:
+        _now.generation = found
+        if found:
+            _done.put(lambda: [tell() for tell in list(_now.ready)])
 
 
 def _serve() -> None:
@@ -287,16 +300,14 @@ def _serve() -> None:
 def _work(job: _Job) -> None:
     try:
         found = _connected(job.where)
-        generation = found.generation
         job.result = job.work(found)
-        if found.generation != generation:
-            _done.put(lambda: [tell() for tell in list(_now.ready)])
+        _look()
     except Exception as error:
         if not isinstance(error, (ServerError, Problem)):
             traceback.print_exc()
         job.problem = met(error)
-        if _now.client is None and not _now.why:
-            _now.why = str(job.problem) if job.problem.code != "environment" else ""
+        if _now.client is None and not _now.why and job.problem.code != "environment":
+            _now.why = str(job.problem)
 
 
 def _deliver(job: _Job) -> None:

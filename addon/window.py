@@ -31,6 +31,6 @@ def tell(problem: Exception) -> None:
 def push_undo(name: str) -> None:
     """Make an undo step outside an operator."""
     windows = bpy.context.window_manager.windows
-    if windows and not bpy.app.background:  # without a display, Blender crashes on a menu
+    if windows and not bpy.app.background:
         with bpy.context.temp_override(window=windows[0]):
             bpy.ops.ed.undo_push(message=name)

@@ -12,17 +12,15 @@ where `make blender` has made its environment. For one core: `taskset -c 1` befo
 """
 
 import multiprocessing
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import table
-from deform import BLENDER, BLENDER_MOST, SIZES, surface_points
+from blender_process import PYTHON, Blender, cage_scene
+from deform import BLENDER_MOST, SIZES, surface_points
 from table import median
 
 PAPER = {
@@ -134,24 +132,15 @@ def points_inside(size: int) -> np.ndarray:
 
 def blender(points: np.ndarray, cage: Any, controls: np.ndarray, precision: int) -> Any:
     """What Blender makes of the same and how long it takes; None where it is not there."""
-    if not BLENDER.exists():
+    if not PYTHON.exists():
         return None
-    script = Path(__file__).parent / "blender_cage.py"
-    with tempfile.TemporaryDirectory() as folder:
-        given, result = Path(folder) / "in.npz", Path(folder) / "out.npz"
-        moved = cage.rest + controls.reshape(-1, 3)
-        np.savez(
-            given, points=points, rest=cage.rest, moved=moved, faces=cage.shape.faces,
-            precision=precision,
-        )  # fmt: skip
-        done = subprocess.run(
-            [BLENDER, script, given, result], capture_output=True, text=True, timeout=600
-        )
-        if done.returncode:
-            print((done.stdout + done.stderr)[-500:], file=sys.stderr)
-            return None
-        with np.load(result) as found:
-            return dict(found)
+    try:
+        with Blender() as process:
+            told = process.open(**cage_scene(points, cage, controls, precision))
+            return process.deform(repeats=30) | {"bind": told["bind"]}
+    except RuntimeError as error:
+        print(error, file=sys.stderr)
+        return None
 
 
 def _compared(found: Any, controls: np.ndarray, ours: np.ndarray, row: Any) -> table.Row:

@@ -9,16 +9,14 @@ Blender's lattice modifier is timed in the same run where `make blender` has mad
 
 import multiprocessing
 import resource
-import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import table
+from blender_process import PYTHON, Blender, lattice_scene
 from table import median
 
 SIZES = (1_300, 6_000, 48_000, 127_000, 185_000, 1_000_000, 10_000_000)
@@ -27,8 +25,6 @@ BLENDER_MOST = 1_000_000
 PAPER = {1_300: 2.0, 6_000: 9.0, 48_000: 73.0, 127_000: 191.0, 185_000: 289.0}
 """The paper's Table 1, 27-point lattice on a Core 2 Duo laptop [ms]; the 10x10x10 is not in it."""
 
-ROOT = Path(__file__).parent.parent
-BLENDER = ROOT / ".venv-blender/bin/python"
 COLUMNS = (
     "vertices", "lattice", "embed", "copy", "deform", "x", "JVP", "VJP", "VJP/deform",
     "follow", "follow/deform", "follow VJP", "bytes/vertex", "Blender", "Blender/deform",
@@ -105,26 +101,22 @@ def surface_points(size: int) -> np.ndarray:
 
 def blender_time(points: np.ndarray, count: int) -> tuple[float, float] | None:
     """Median time of Blender's lattice modifier [ms] and the cores it took; None without it."""
-    script = Path(__file__).parent / "blender_lattice.py"
-    if not BLENDER.exists() or not script.exists():
+    if not PYTHON.exists():
         return None
+    import moldline as ml
+
     low, high = points.min(axis=0), points.max(axis=0)
-    lines = [np.linspace(a, b, count) for a, b in zip(low, high, strict=True)]
-    grid = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
-    rest = grid.transpose(2, 1, 0, 3).reshape(-1, 3)  # Blender's order: the first axis runs fastest
-    moved = rest + 0.01 * np.random.default_rng(0).normal(size=rest.shape)
-    with tempfile.TemporaryDirectory() as folder:
-        given, result = Path(folder) / "in.npz", Path(folder) / "out.npz"
-        np.savez(given, points=points, shape=np.full(3, count), rest=rest, moved=moved)
-        done = subprocess.run(
-            [BLENDER, script, given, result], capture_output=True, text=True, timeout=600
-        )
-        if done.returncode:
-            print(done.stderr[-500:], file=sys.stderr)
-            return None
-        found = np.load(result)
-        wall = float(np.median(found["seconds"]))
-        return 1e3 * wall, float(np.median(found["processor_seconds"])) / wall
+    lattice = ml.Lattice.box(low, high, (count,) * 3, ends="blender", outside="extend")
+    controls = 0.01 * np.random.default_rng(0).normal(size=lattice.size)
+    try:
+        with Blender() as blender:
+            blender.open(**lattice_scene(points, lattice, controls))
+            found = blender.deform(repeats=30)
+    except RuntimeError as error:
+        print(error, file=sys.stderr)
+        return None
+    wall = float(np.median(found["seconds"]))
+    return 1e3 * wall, float(np.median(found["processor_seconds"])) / wall
 
 
 def _warm(count: int) -> None:

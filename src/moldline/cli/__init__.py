@@ -11,7 +11,7 @@ from typing import Any
 
 COMMANDS = (
     "parameterise", "build", "deform", "sensitivity", "measure", "check", "info", "convert",
-    "plot", "sweep", "serve", "schema",
+    "plot", "sweep", "serve", "blender", "schema",
 )  # fmt: skip
 
 DESCRIPTION = """\

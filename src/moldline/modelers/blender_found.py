@@ -47,6 +47,7 @@ def found_interpreter(given: Path | None = None, beside: Path = Path()) -> Path:
         return _named(own, f"the environment variable {VARIABLE}")
     folders = [environment(version) for version in VERSIONS]
     folders += [Path(BESIDE).absolute(), (beside / BESIDE).absolute()]
+    folders = list(dict.fromkeys(folders))
     for python in map(python_of, folders):
         if python.exists():
             return python

@@ -1,0 +1,56 @@
+"""`moldline blender`."""
+
+import argparse
+from pathlib import Path
+
+from . import show
+
+HELP = "Make an environment with Blender, or tell what can be turned in a Blender file."
+EXAMPLE = """\
+  moldline blender make
+  moldline blender list scene.blend --object wing"""
+
+
+def configure(command: argparse.ArgumentParser) -> None:
+    """Arguments."""
+    actions = command.add_subparsers(dest="action", metavar="ACTION", required=True)
+    make = actions.add_parser(
+        "make", help="make an environment of its own with Blender as a Python module (800 MB)"
+    )
+    make.add_argument("--version", default="4.5", help="of Blender: 4.5 or 5.2 (4.5)")
+    make.add_argument(
+        "--folder", type=Path, help="where; else in this user's cache, where it is found again"
+    )
+    found = actions.add_parser("list", help="tell what can be turned in a .blend file")
+    found.add_argument("file", type=Path, help=".blend file")
+    found.add_argument("--object", help="of this object only")
+    found.add_argument(
+        "--python", type=Path, help="a Blender, or a Python that has bpy; else it is looked for"
+    )
+    found.add_argument("--json", action="store_true", help="report for a script")
+
+
+def run(given: argparse.Namespace) -> int:
+    """Do it."""
+    return _make(given) if given.action == "make" else _list(given)
+
+
+def _make(given: argparse.Namespace) -> int:
+    from ..modelers.blender_found import VARIABLE
+    from ..modelers.blender_making import make
+
+    python = make(given.version, given.folder)
+    print(f"Blender {given.version} is in {python.parent.parent}")
+    if given.folder is not None:
+        print(f"it is found with {VARIABLE}={python}, or with python = {str(python)!r} in a stage")
+    return 0
+
+
+def _list(given: argparse.Namespace) -> int:
+    from ..modelers import blender_listing
+
+    listed = blender_listing.turnable(given.file, given.python)
+    if given.object is not None:
+        listed = blender_listing.of_object(listed, given.object)
+    show({"objects": listed}, given.json, blender_listing.sentences(listed))
+    return 0

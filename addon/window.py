@@ -15,7 +15,7 @@ def show(text: str) -> None:
                 area.tag_redraw()
 
 
-def tell(problem: Exception) -> None:
+def tell(problem: object) -> None:
     """A sentence in the window."""
 
     def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:

@@ -156,7 +156,7 @@ def test_lines_and_clouds_have_no_faces():
 
 def test_a_union_made_anew_has_other_faces_in_the_same_object(exact):
     thing = _made(exact)
-    points, faces = ball()
+    points = ball()[0]
     convert.set_faces(thing, points[:6], np.array([[0, 1, 2], [1, 3, 2]]), [0, 1], ["a", "b"])
     assert len(thing.data.vertices) == 6 and convert.components(thing) == ["a", "b"]
     np.testing.assert_array_equal(convert.points(thing.data), points[:6])
@@ -164,7 +164,7 @@ def test_a_union_made_anew_has_other_faces_in_the_same_object(exact):
 
 
 def test_numbers_by_point_come_back():
-    points, faces = ball()
+    points = ball()[0]
     thing = _made(points, data={"cp": points[:, 0], "force": points})
     found = convert.data(thing.data)
     assert set(found) == {"cp", "force"}

@@ -3,8 +3,8 @@
 import contextlib
 import os
 import signal
-import threading
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -125,7 +125,7 @@ def test_a_python_that_is_not_there_or_has_no_moldline_is_told(preferences, tmp_
     with pytest.raises(session.Problem, match=r"no Python at .*preferences"):
         session.start()
     preferences.python = sys.executable
-    with pytest.raises(session.Problem, match="No module named.*another Python"):
+    with pytest.raises(session.Problem, match=r"No module named.*another Python"):
         session.start()
     assert session.state() == "failed"
 
@@ -134,7 +134,7 @@ def test_another_protocol_is_told_with_the_remedy(monkeypatch):
     session.start()
     session.forget()
     monkeypatch.setattr(protocol, "PROTOCOL", 99)
-    with pytest.raises(session.Problem, match="99.*update one of the two"):
+    with pytest.raises(session.Problem, match=r"99.*update one of the two"):
         session.start()
     assert session.state() == "failed"
 

@@ -22,6 +22,7 @@ MOST_OPEN = 4
 
 _cases: dict[tuple[str, str], tuple[Any, Any]] = {}
 _opening: set[tuple[str, str]] = set()
+_refused: set[tuple[str, str]] = set()
 
 
 class MoldlineProject(bpy.types.PropertyGroup):
@@ -102,7 +103,18 @@ def set_values(scene: bpy.types.Scene, given: Mapping[str, Any]) -> None:
 
 def is_open(scene: bpy.types.Scene) -> bool:
     """Whether the scene's case is open on a server that runs."""
-    return _found(scene) is not None
+    return opened(scene) is not None
+
+
+def waits(scene: bpy.types.Scene) -> bool:
+    """Whether the case could be opened and nobody has tried to."""
+    is_known = _key(scene) in _opening or _key(scene) in _refused
+    return has_case(scene) and not is_known and session.state() == "ready" and not is_open(scene)
+
+
+def opened(scene: bpy.types.Scene) -> Any:
+    """The scene's case on the server, or None where it is not open."""
+    return _found(scene) if has_case(scene) else None
 
 
 def case(scene: bpy.types.Scene) -> Any:
@@ -157,6 +169,8 @@ def update_text(
 
     def opened(scene: bpy.types.Scene, found: tuple) -> None:
         here = scene.moldline
+        if any(o != scene and o.moldline.text == here.text for o in bpy.data.scenes):
+            here.text = bpy.data.texts.new(here.text.name)  # a copied scene keeps its own
         here.text.clear()
         here.text.write(text)
         _build(scene, *found)
@@ -180,6 +194,12 @@ def close_case(scene: bpy.types.Scene) -> None:
                 del here.surface[name]
     for name in ("text", "folder", "path", "surface", "description", "status", "is_alert"):
         here.property_unset(name)
+
+
+def forget() -> None:
+    """Forget connections and what failed: cases are opened again from their texts."""
+    for known in (_cases, _opening, _refused):
+        known.clear()
 
 
 def tell(scene: bpy.types.Scene, sentence: str, is_alert: bool = False) -> None:
@@ -214,6 +234,7 @@ def _open(
     name, key = scene.name, (folder, text)
     kept = values(scene)
     _opening.add(key)
+    _refused.discard(key)
 
     def work(client: Any) -> tuple:
         found = client.open(text=text, folder=folder)
@@ -240,6 +261,7 @@ def _open(
 
     def refused(problem: Any) -> None:
         _opening.discard(key)
+        _refused.add(key)
         scene = bpy.data.scenes.get(name)
         if scene is not None:
             tell(scene, str(problem), is_alert=True)
@@ -364,7 +386,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Take it away; connections are forgotten."""
-    _cases.clear()
-    _opening.clear()
+    forget()
     del bpy.types.Scene.moldline
     bpy.utils.unregister_class(MoldlineProject)

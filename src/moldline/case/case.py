@@ -1,6 +1,7 @@
 """A case: what a case file describes, ready to run."""
 
 import os
+import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -145,6 +146,21 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
             for name, table in tables.rider.items()
         }
     return Case(place, tables, pipeline, riders, _measurements(file, tables, pipeline, sampled))
+
+
+def of_text(text: str, folder: Path) -> Case:
+    """The case that a text describes, whose files are named from a folder."""
+    stand_in = folder / f".moldline-{secrets.token_hex(6)}.toml"
+    try:
+        stand_in.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise CaseError(f"{folder}: a case given as text is put here, but: {error}") from None
+    try:
+        return load(stand_in)
+    except CaseError as error:
+        raise CaseError(str(error).replace(str(stand_in), "the case's text")) from None
+    finally:
+        stand_in.unlink(missing_ok=True)
 
 
 def _measurements(

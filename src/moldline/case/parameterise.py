@@ -3,7 +3,7 @@
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from .. import registry
 from ..deformers.posed import AbstractPosed
 from ..errors import GeometryError, ParameterError
+from ..measures.position import Position
 from ..mesh import Geometry, Section, Surface
 from ..mesh.enclosure import part_of
 from ..mesh.io import read, write
@@ -73,32 +74,42 @@ def parameterise(
     `options` are those of the kind, see `KINDS`. Lengths in them, and in the file, are metres where
     `units` says what the geometry's are, else the geometry's own.
     """
-    if kind not in KINDS:
-        raise ParameterError(f"no kind {kind!r}; there is: {', '.join(KINDS)}")
-    geometry = read(source, units=units)
-    try:
-        draft = KINDS[kind](geometry, **{k: v for k, v in options.items() if v is not None})
-    except TypeError as error:
-        wrong = re.search(r"unexpected keyword argument '(\w+)'", str(error))
-        if wrong is None:
-            raise
-        raise ParameterError(f"{kind} takes no {wrong[1]}") from None
+    draft = made(kind, read(source, units=units), options)
     for ending, surface in draft.beside.items():
         beside = target.with_name(f"{target.stem}{ending}")
         write(beside, surface, units=units)
         draft.stage |= {"file": beside.name} | ({"units": units} if units else {})
     name = re.sub(r"\W", "_", source.stem) or "geometry"
-    table = {"file": _beside(source, target)} | ({"units": units} if units else {})
+    begin = f"made for {source.name} by moldline parameterise; edit it"
+    with replacing(target) as stream:
+        stream.write(written(draft, name, _beside(source, target), units, begin).encode())
+    return load(target), draft.why
+
+
+def made(kind: str, geometry: Geometry, options: Mapping[str, Any]) -> Draft:
+    """A draft of one of `KINDS` for a geometry, by options that are not None."""
+    if kind not in KINDS:
+        raise ParameterError(f"no kind {kind!r}; there is: {', '.join(KINDS)}")
+    try:
+        return KINDS[kind](geometry, **{k: v for k, v in options.items() if v is not None})
+    except (TypeError, ValueError) as error:
+        wrong = re.search(r"unexpected keyword argument '(\w+)'", str(error))
+        if wrong is not None:
+            raise ParameterError(f"{kind} takes no {wrong[1]}") from None
+        told = ", ".join(f"{k} = {v!r:.40}" for k, v in options.items())
+        raise ParameterError(f"{kind} cannot be made with {told}: {error}") from None
+
+
+def written(draft: Draft, name: str, file: str, units: str | None, begin: str) -> str:
+    """The text of a new case of one geometry."""
+    table = {"file": file} | ({"units": units} if units else {})
     tables = {
         "moldline": 1,
         "geometry": {name: table},
         "variable": draft.variables,
         "stage": [{**draft.stage, "link": draft.links}],
     }
-    with replacing(target) as stream:
-        stream.write(f"# made for {source.name} by moldline parameterise; edit it\n".encode())
-        stream.write(f"# {draft.why}\n{_toml(tables)}".encode())
-    return load(target), draft.why
+    return f"# {begin}\n# {draft.why}\n{_toml(tables)}"
 
 
 def _toml(table: Mapping[str, Any], name: str = "") -> str:
@@ -206,6 +217,42 @@ def cage(maker: str) -> Callable[..., Draft]:
     return drafted
 
 
+def pilots(
+    geometry: Geometry,
+    *,
+    spots: Sequence[Sequence[float]],
+    names: Sequence[str] | None = None,
+    along: str | Sequence[float] | None = None,
+) -> Draft:
+    """Places of the shape that go where they are told; the rest follows by the least motion.
+
+    `along` is the direction that they are held in, by default every one: names of axes, such as
+    "xz", or a vector.
+    """
+    places = np.asarray(spots, float)
+    if places.ndim != 2 or places.shape[1:] != (3,) or not len(places):
+        raise ParameterError(f"spots are places in space, three numbers each, got {spots!r:.80}")
+    chosen = list(names) if names else [f"p{i + 1}" for i in range(len(places))]
+    if len(chosen) != len(places) or len(set(chosen)) < len(chosen):
+        raise ParameterError(f"{len(places)} spots need as many different names, got {chosen}")
+    if odd := [one for one in chosen if not isinstance(one, str) or not one.isidentifier()]:
+        raise ParameterError(f"a pilot's name is a word without spaces, got {odd[0]!r}")
+    way = along if isinstance(along, str) or along is None else [float(x) for x in along]
+    own: dict[str, Any] = {} if way is None else {"along": way}
+    found = {name: {"near": row} for name, row in zip(chosen, places.tolist(), strict=True)}
+    held = {n: Position.build(geometry, spot=s, **own) for n, s in found.items()}  # type: ignore
+    size = sum(one.size for one in held.values())
+    draft = Draft(
+        {"deformer": "pilots"},
+        f"{size} numbers: {len(places)} places of the shape that go where they are told",
+    )
+    draft.stage["pilot"] = {n: {"measure": "position", "spot": s} | own for n, s in found.items()}
+    reach = BOUND * float(np.ptp(np.asarray(geometry.points), axis=0).max())
+    for name, one in held.items():
+        draft.add(f"move_{name}", {"link": "named", "parameter": name}, one.size, reach, "m")
+    return draft
+
+
 def _surface(geometry: Geometry, need: str) -> Surface:
     if not isinstance(geometry, Surface):
         raise GeometryError(
@@ -272,5 +319,6 @@ KINDS: dict[str, Callable[..., Draft]] = {
     "body-cage": cage("around_body"),
     "wing-skeleton": posed("wing_skeleton"),
     "body-skeleton": posed("body_skeleton"),
+    "pilots": pilots,
 }
 """Kinds of parameterisation by the name that the command line calls them."""

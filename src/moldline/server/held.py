@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import secrets
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case, load
-from ..errors import CaseError
+from ..case.case import of_text
 from ..mesh import Geometry
 from ..pipeline.pipeline import Pipeline
 from .hands import Hand, hands
@@ -96,18 +95,7 @@ def opened(header: Mapping[str, Any]) -> Held:
     """The case that a request names: by its path, or as text with the folder of its files."""
     if "path" in header:
         return Held(load(header["path"]))
-    folder = Path(header["folder"])
-    stand_in = folder / f".moldline-{secrets.token_hex(6)}.toml"  # names in it are from this folder
-    try:
-        stand_in.write_text(header["text"], encoding="utf-8")
-    except OSError as error:
-        raise CaseError(f"{folder}: a case given as text is put here, but: {error}") from None
-    try:
-        return Held(load(stand_in))
-    except CaseError as error:
-        raise CaseError(str(error).replace(str(stand_in), "the case's text")) from None
-    finally:
-        stand_in.unlink(missing_ok=True)
+    return Held(of_text(header["text"], Path(header["folder"])))
 
 
 def text(ask: Message, name: str, otherwise: str | None = None) -> str:

@@ -4,7 +4,9 @@
 from collections.abc import Callable
 from typing import Any
 
-from . import edits, project, session, view
+import bpy
+
+from . import edits, project, session, view, window
 
 Make = Callable[[Any], edits.Edits]
 """Edits, made in a thread beside Blender with the client at hand."""
@@ -29,22 +31,29 @@ def amend(
     problems: list[str] = []
 
     def work(client: Any) -> str:
-        wanted = make(client) if callable(make) else make
+        try:
+            wanted = make(client) if callable(make) else make
+        except edits.Wrong as problem:
+            raise session.Problem(str(problem)) from None
         return client.amend(text, folder, wanted)["text"]
 
     def done() -> None:
-        own = _scene(name)
+        own = bpy.data.scenes[name]
         view.sync(own)
         if then is not None:
             then(own)
         view.looked(own)
         view.redraw()
+        if not bpy.app.background:
+            window.push_undo(what)
 
     def taken(new: str) -> None:
-        project.update_text(_scene(name), new, then=done)
+        project.update_text(bpy.data.scenes[name], new, then=done, failed=problems.append)
 
     def failed(problem: Exception) -> None:
         problems.append(str(problem))
+        if not bpy.app.background:  # the operator has ended by now
+            window.tell(problem)
 
     session.run(work, then=taken, failed=failed, what=what)
     return finished(operator, problems)
@@ -56,9 +65,3 @@ def finished(operator: Any, problems: list[str]) -> set[str]:
         operator.report({"ERROR"}, problems[0])
         return {"CANCELLED"}
     return {"FINISHED"}
-
-
-def _scene(name: str) -> Any:
-    import bpy
-
-    return bpy.data.scenes[name]

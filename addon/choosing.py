@@ -118,7 +118,7 @@ def normal_near(surface: Any, spots: Sequence[Vector]) -> list[float]:
         is_found, _, normal, _ = surface.closest_point_on_mesh(into @ spot)
         if is_found:
             total += (turn @ normal).normalized()
-    if total.length < 1e-3 * len(spots):
+    if total.length < 0.1 * len(spots):
         raise edits.Wrong(
             "the normals next to the selected control points cancel out; choose an axis, or points "
             "on one side of the surface"

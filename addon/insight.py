@@ -42,9 +42,8 @@ def health(scene: Any) -> dict[str, Any]:
 
 
 def overview(scene: Any) -> dict[str, Any]:
-    """What the pipeline is made of, as `moldline info` tells it; empty where no case is open."""
-    opened = project.opened(scene)
-    return opened.description["overview"] if opened is not None else {}
+    """What the pipeline is made of, as `moldline info` tells it; empty without a case."""
+    return project.description(scene).get("overview", {})
 
 
 def refresh(scene: Any, failed: Any = None) -> None:
@@ -82,7 +81,7 @@ def _paint(scene: Any, case: Any, values: dict[str, Any], failed: Any) -> None:
     if table is None:
         failed(session.Problem("choose a variable; colours show how the shape answers to it"))
         return
-    number = min(scene.moldline_view.number, edits.size_of(table) - 1)
+    number = min(scene.moldline.active_number, edits.size_of(table) - 1)
     title = f"{edits.labels_of(variable, table)[number]}: {_WHAT[how]}"
     unit = f"m/{table['unit']}" if table.get("unit") else "m"
     session.run(
@@ -258,8 +257,8 @@ def _shape_key(scene: Any) -> Any:
 
 def _key(scene: Any) -> Any:
     """What readings and colours depend on."""
-    chosen, surface = scene.moldline_view, scene.moldline.surface
-    look = chosen.is_coloured and (view.active_variable(scene), chosen.number, chosen.how)
+    chosen, told, surface = scene.moldline_view, scene.moldline, scene.moldline.surface
+    look = chosen.is_coloured and (view.active_variable(scene), told.active_number, chosen.how)
     points = len(surface.data.vertices) if surface is not None and look else 0
     return _shape_key(scene), look, points
 

@@ -63,7 +63,7 @@ class MOLDLINE_OT_edit_variable(Operator):
 
     bl_idname = "moldline.edit_variable"
     bl_label = "Edit Variable"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     name: StringProperty(name="Name", description="One word; links follow it")
     bounded: BoolProperty(
@@ -153,7 +153,7 @@ class MOLDLINE_OT_remove_variable(Operator):
 
     bl_idname = "moldline.remove_variable"
     bl_label = "Remove Variable"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     @classmethod
     def poll(cls, context):
@@ -172,7 +172,7 @@ class MOLDLINE_OT_bound_variable(Operator):
 
     bl_idname = "moldline.bound_variable"
     bl_label = "Bounds around Present Values"
-    bl_options = {"REGISTER", "UNDO"}
+    bl_options = {"REGISTER"}
 
     how: EnumProperty(
         name="Reach",

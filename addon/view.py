@@ -55,17 +55,7 @@ class MOLDLINE_PG_view(PropertyGroup):
 
     variables: CollectionProperty(type=MOLDLINE_PG_row)
     measures: CollectionProperty(type=MOLDLINE_PG_row)
-    variable: IntProperty(
-        name="Variable", description="The variable whose numbers are shown", update=_look
-    )
-    measure: IntProperty(name="Measure", description="The measure that is shown")
     first: IntProperty(name="From Number", description="The first number that has a slider", min=0)
-    number: IntProperty(
-        name="Number",
-        description="The number of the variable that the colours are about",
-        min=0,
-        update=_look,
-    )
     is_coloured: BoolProperty(
         name="Sensitivity", description="Whether the surface shows how it answers to a variable"
     )
@@ -82,12 +72,12 @@ def case_of(scene: Any) -> dict[str, Any]:
 
 def active_variable(scene: Any) -> str:
     """Name of the active variable, or nothing."""
-    return _active(scene.moldline_view.variables, scene.moldline_view.variable)
+    return _active(scene.moldline_view.variables, scene.moldline.active_variable)
 
 
 def active_measure(scene: Any) -> str:
     """Name of the active measure, or nothing."""
-    return _active(scene.moldline_view.measures, scene.moldline_view.measure)
+    return _active(scene.moldline_view.measures, scene.moldline.active_measure)
 
 
 def is_stale(scene: Any) -> bool:
@@ -106,8 +96,9 @@ def sync(scene: Any) -> None:
         for name in names:
             rows.add().name = name
     choose(scene, *chosen)
-    view.variable = max(0, min(view.variable, len(view.variables) - 1))
-    view.measure = max(0, min(view.measure, len(view.measures) - 1))
+    here = scene.moldline
+    here.active_variable = max(0, min(here.active_variable, len(view.variables) - 1))
+    here.active_measure = max(0, min(here.active_measure, len(view.measures) - 1))
 
 
 def sync_soon() -> None:
@@ -118,11 +109,11 @@ def sync_soon() -> None:
 
 def choose(scene: Any, variable: str = "", measure: str = "") -> None:
     """Make a variable or a measure the active one."""
-    view = scene.moldline_view
-    if variable in view.variables and view.variables.find(variable) != view.variable:
-        view.variable = view.variables.find(variable)
-    if measure in view.measures and view.measures.find(measure) != view.measure:
-        view.measure = view.measures.find(measure)
+    view, here = scene.moldline_view, scene.moldline
+    if variable in view.variables:
+        here.active_variable = view.variables.find(variable)
+    if measure in view.measures:
+        here.active_measure = view.measures.find(measure)
 
 
 def redraw() -> None:

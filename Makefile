@@ -1,4 +1,4 @@
-# make demo | test | check | slow | bench | docs | blender      (the first two need nothing but Python 3.11+)
+# make demo | test | check | slow | bench | docs | blender | addon      (the first two need nothing but Python 3.11+)
 
 PYTHON ?= python3
 BIN := .venv/bin
@@ -8,7 +8,7 @@ UV_VERSION := 0.13.9
 SPREAD := -n auto --maxprocesses 4 --dist loadfile
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check slow bench docs blender format lock clean
+.PHONY: help demo test check slow bench docs blender addon format lock clean
 
 help:  ## what there is
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 10
@@ -57,8 +57,11 @@ bench: .venv/ready  ## the benchmark tables: deformation, embedding, cages, pilo
 docs: .venv/ready-dev  ## the documentation, into site/
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
-blender:  ## an environment with Blender as a module, for comparison
+blender:  ## an environment with Blender as a module, for comparison and the add-on's tests
 	@bash tools/blender_env.sh
+
+addon: .venv/ready  ## the Blender extension, dist/moldline-*.zip (needs a Blender: on PATH, as BLENDER=, or make blender)
+	@$(BIN)/python tools/build_addon.py
 
 format: .venv/ready-dev  ## put the code into shape
 	@$(BIN)/ruff format .

@@ -9,7 +9,7 @@ from . import environment, session
 
 
 class MOLDLINE_OT_make_environment(bpy.types.Operator):
-    """Make a Python environment with moldline in Blender's user folder, or renew it (goes online)"""
+    """Make a Python environment with moldline in Blender's user folder, or renew it (online)"""
 
     bl_idname = "moldline.make_environment"
     bl_label = "Make Environment"

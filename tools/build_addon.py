@@ -94,7 +94,7 @@ def main() -> None:
     reader.add_argument("--output", type=Path, default=TOP / "dist", help="folder for the file")
     reader.add_argument("--staged", type=Path, default=TOP / "build/addon", help="folder to use")
     asked = reader.parse_args()
-    given = asked.wheel or wheel(TOP / "build/wheel")
+    given = asked.wheel or wheel(asked.staged.parent / "wheel")
     print(build(stage(asked.staged, given), asked.output))
 
 

@@ -19,7 +19,7 @@ MODULE = "bl_ext.user_default.moldline"
 """What Blender calls the installed extension; tests import from it."""
 
 _HAS_BLENDER = importlib.util.find_spec("bpy") is not None
-_FOLDER = Path(tempfile.mkdtemp(prefix="moldline-addon-"))
+_FOLDER = Path(tempfile.gettempdir()) / f"moldline-addon-{os.getpid()}"
 
 CASE = """\
 moldline = 1

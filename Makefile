@@ -60,8 +60,8 @@ docs: .venv/ready-dev  ## the documentation, into site/
 blender:  ## an environment with Blender as a module, for comparison and the add-on's tests
 	@bash tools/blender_env.sh
 
-addon: .venv/ready  ## the Blender extension, dist/moldline-*.zip (needs a Blender: on PATH, as BLENDER=, or make blender)
-	@$(BIN)/python tools/build_addon.py
+addon: $(UV)  ## the Blender extension, dist/moldline-*.zip (needs a Blender: on PATH, as BLENDER=, or make blender)
+	@$(PYTHON) tools/build_addon.py
 
 format: .venv/ready-dev  ## put the code into shape
 	@$(BIN)/ruff format .

@@ -4,8 +4,8 @@ import tomllib
 import zipfile
 from pathlib import Path
 
-import bpy
 import bl_ext.user_default.moldline as addon
+import bpy
 import pytest
 
 TOP = Path(__file__).parents[2]

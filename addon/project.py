@@ -50,7 +50,7 @@ class MoldlineProject(bpy.types.PropertyGroup):
     active_measure: bpy.props.IntProperty(name="Measure", min=0)
     active_stage: bpy.props.IntProperty(name="Stage", min=0)
     status: bpy.props.StringProperty(description="What was last told")
-    is_alert: bpy.props.BooleanProperty(description="Whether what was told asks for attention")
+    is_alert: bpy.props.BoolProperty(description="Whether what was told asks for attention")
 
 
 def has_case(scene: bpy.types.Scene) -> bool:
@@ -313,6 +313,8 @@ def _shown(scene: bpy.types.Scene, case: Any, shape: Any) -> bpy.types.Object:
             shown.data.from_pydata(shape.points, _lines(case, len(shape.points)), ())
         else:
             convert.set_faces(shown, shape.points, faces, tags, components)
+    shown.pop("moldline_joined", None)
+    shown.pop("moldline_edited", None)
     convert.set_points(shown.data, shape.points)
     if shown.name not in scene.objects:
         scene.collection.objects.link(shown)
@@ -325,9 +327,11 @@ def is_other(mesh: bpy.types.Mesh, points: np.ndarray, faces: np.ndarray | None)
         return True
     if faces is None:
         return len(mesh.polygons) > 0
-    corners = np.empty(len(mesh.loops), np.int32)
-    if len(corners) != faces.size or len(mesh.polygons) != len(faces):
+    if len(mesh.polygons) != len(faces) - mesh.get(convert.LEFT_OUT, 0):
         return True
+    corners = np.empty(len(mesh.loops), np.int32)
+    if len(corners) != faces.size:
+        return faces.shape[1] == 3 and not mesh.get(convert.LEFT_OUT)
     mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
     return not np.array_equal(corners, np.ravel(faces))
 

@@ -49,14 +49,18 @@ def labels(obj: bpy.types.Object) -> list[str]:
 
 
 def rebuild(scene: bpy.types.Scene, surface: bpy.types.Object, found: Sequence[Any]) -> None:
-    """Make the scene's handles those that a case has; such as fit are kept."""
+    """Make the scene's handles those that a case has.
+
+    Such as fit are kept, and what a hand has moved stays moved.
+    """
     left = [one for one in scene.objects if one.moldline.role]
     for handle in found:
         fits = [one for one in left if _fits(one, handle)]
         if fits:
             left.remove(fits[0])
             _describe(fits[0], handle, surface)
-            write(fits[0], handle.moved)
+            if not state(fits[0])[1].any():
+                write(fits[0], handle.moved)
         else:
             create(scene, surface, handle)
     for one in left:

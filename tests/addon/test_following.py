@@ -1,0 +1,248 @@
+"""The shape follows what a hand moves and what values say, and comes back with undo."""
+
+import os
+import signal
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+from bl_ext.user_default.moldline import convert, following, handles, project, session
+from mathutils import Vector
+
+
+@pytest.fixture
+def scene(ball_case):
+    """A scene with the ball's case, its handle free to move along z by two numbers."""
+    found = bpy.context.scene
+    project.open_case(found, ball_case.read_text(), str(ball_case.parent), str(ball_case))
+    following.settle()
+    return found
+
+
+@pytest.fixture
+def free(scene, tmp_path):
+    """The same with a number for each control point and direction, without bounds."""
+    text = project.text(scene).replace("bounds = [-1.0, 1.0]", "").replace("size = 2", "size = 12")
+    links = "".join(
+        f'\n[[stage.link]]\nvariable = "{n}"\nlink = "each"\naxis = "{axis}"\n'
+        for n, axis in (("lift", "z"), ("push", "x"))
+    )
+    text = text.replace(
+        '[[stage.link]]\nvariable = "lift"\nlink = "camber"\nalong = "x"\naxis = "z"\n', links
+    ).replace("[[stage]]", '[variable.push]\nsize = 12\nunit = "m"\n\n[[stage]]', 1)
+    project.update_text(scene, text)
+    assert project.text(scene) == text, scene.moldline.status
+    following.settle()
+    return scene
+
+
+def shape(scene):
+    """Points of the surface in the scene."""
+    return convert.points(project.surface(scene).data)
+
+
+def wanted(scene):
+    """Points for the scene's values."""
+    return project.case(scene).points(project.values(scene))
+
+
+def edit(obj, index, motion):
+    """Move one vertex in edit mode, and leave it."""
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.mode_set(mode="EDIT")
+    own = bmesh.from_edit_mesh(obj.data)
+    own.verts.ensure_lookup_table()
+    own.verts[index].co += Vector(motion)
+    bmesh.update_edit_mesh(obj.data)
+
+
+def test_a_slider_moves_the_shape_in_double_precision(scene):
+    surface = project.surface(scene)
+    surface["lift"][1] = 0.25
+    following.settle()
+    np.testing.assert_array_equal(shape(scene), wanted(scene))
+    assert np.ptp(shape(scene)[:, 2]) > 2.01
+    net = handles.of_stage(scene, 0)
+    np.testing.assert_array_equal(
+        handles.read(net), project.case(scene).handles({"lift": [0, 0.25]})[0].moved
+    )
+
+
+def test_a_control_point_moved_in_edit_mode_moves_the_shape(free):
+    net = handles.of_stage(free, 0)
+    edit(net, 3, (0.0, 0.0, 0.5))
+    following.settle()
+    values = project.values(free)
+    assert values["lift"][3] == pytest.approx(0.5, abs=1e-6)
+    assert np.abs(np.delete(values["lift"], 3)).max() < 1e-9
+    np.testing.assert_array_equal(shape(free), wanted(free))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    following.settle()
+    assert project.values(free)["lift"][3] == values["lift"][3]
+
+
+def test_what_bounds_refuse_is_told_and_the_handle_goes_back(scene):
+    net = handles.of_stage(scene, 0)
+    before = handles.read(net)
+    edit(net, 0, (0.0, 0.0, 50.0))
+    following.settle()
+    assert "at its bounds: lift" in scene.moldline.status
+    assert project.values(scene)["lift"].max() == 1.0
+    now = handles.read(net)
+    np.testing.assert_allclose((now - before)[:6, 2], 1.0, atol=1e-12)
+
+
+def test_a_value_beyond_its_bounds_is_told_and_the_shape_stays(scene):
+    before = shape(scene)
+    project.surface(scene)["lift"][0] = 7.0
+    following.settle()
+    assert "lift[0] = 7" in scene.moldline.status and scene.moldline.is_alert
+    np.testing.assert_array_equal(shape(scene), before)
+    project.set_values(scene, {"lift": [0.5, 0.0]})
+    following.settle()
+    assert scene.moldline.status == "" and not scene.moldline.is_alert
+    np.testing.assert_array_equal(shape(scene), wanted(scene))
+
+
+def test_a_handle_moved_as_an_object_counts(free):
+    net = handles.of_stage(free, 0)
+    net.location.z = 0.25
+    following.settle()
+    np.testing.assert_allclose(project.values(free)["lift"], 0.25, atol=1e-7)
+    net.location.z = 0.0
+    following.settle()
+    np.testing.assert_allclose(project.values(free)["lift"], 0.0, atol=1e-7)
+
+
+def test_a_surface_that_is_moved_takes_its_handles_along(free):
+    project.surface(free).location.x = 5.0
+    following.settle()
+    assert not any(np.any(v) for v in project.values(free).values())
+
+
+def test_undo_and_redo_bring_shape_values_and_handle_back(free):
+    bpy.ops.ed.undo_push(message="begin")
+    before = shape(free)
+    edit(handles.of_stage(free, 0), 3, (0.0, 0.0, 0.5))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.ed.undo_push(message="moved")  # before the shape has followed
+    following.settle()
+    after, values = shape(free), project.values(free)
+    bpy.ops.ed.undo_push(message="later")
+    bpy.ops.ed.undo()
+    following.settle()
+    np.testing.assert_array_equal(shape(bpy.context.scene), after)
+    bpy.ops.ed.undo()
+    following.settle()
+    found = bpy.context.scene
+    np.testing.assert_array_equal(shape(found), before)
+    assert not any(np.any(v) for v in project.values(found).values())
+    bpy.ops.ed.redo()
+    following.settle()
+    np.testing.assert_allclose(shape(bpy.context.scene), after, atol=1e-7)
+    np.testing.assert_allclose(project.values(bpy.context.scene)["lift"], values["lift"], atol=1e-7)
+
+
+def test_moving_back_gives_the_same_numbers_to_the_bit(free):
+    project.set_values(free, {"lift": np.linspace(0.0, 0.1, 12)})
+    following.settle()
+    net, before = handles.of_stage(free, 0), shape(free)
+    kept = net.data.vertices[3].co.copy()
+    for _ in range(2):
+        net.data.vertices[3].co.z += 0.5
+        following.settle()
+        net.data.vertices[3].co = kept
+        following.settle()
+        np.testing.assert_array_equal(project.values(free)["lift"], np.linspace(0.0, 0.1, 12))
+        np.testing.assert_array_equal(shape(free), before)
+
+
+def test_key_frames_and_drivers_move_the_shape(scene):
+    surface = project.surface(scene)
+    for frame, height in ((1, 0.0), (11, 0.5)):
+        surface["lift"][0] = height
+        surface.keyframe_insert('["lift"]', index=0, frame=frame)
+    driver = surface.driver_add('["lift"]', 1).driver
+    driver.expression = "frame / 100"
+    scene.frame_set(6)
+    np.testing.assert_allclose(project.values(scene)["lift"], [0.25, 0.06], atol=1e-6)
+    np.testing.assert_array_equal(shape(scene), wanted(scene))
+
+
+def test_two_handles_at_once_are_both_followed(scene):
+    text = project.text(scene) + (
+        '\n[variable.bow]\nsize = 12\nunit = "m"\n\n[[stage]]\nname = "outer"\n'
+        'deformer = "lattice"\nshape = [2, 3, 2]\nmargin = [0.2, 0.2, 0.2]\n\n'
+        '[[stage.link]]\nvariable = "bow"\nlink = "each"\naxis = "z"\n'
+    )
+    project.update_text(scene, text)
+    assert len(handles.all_of(scene)) == 2, scene.moldline.status
+    following.settle()
+    first, second = handles.all_of(scene)
+    for obj in (first, second):
+        for vertex in obj.data.vertices:
+            vertex.co.z += 0.25
+    following.settle()
+    np.testing.assert_allclose(project.values(scene)["lift"], 0.25, atol=1e-6)
+    np.testing.assert_allclose(project.values(scene)["bow"], 0.25, atol=1e-6)
+    np.testing.assert_array_equal(shape(scene), wanted(scene))
+
+
+def test_a_server_that_dies_in_a_drag_loses_nothing(free):
+    surface = project.surface(free)
+    project.set_values(free, {"lift": [0.1] * 12})
+    following.step(free)
+    pid = session.client().cases()[0]["pid"]
+    os.kill(pid, signal.SIGKILL)
+    project.set_values(free, {"lift": [0.2] * 12})
+    following.settle()
+    np.testing.assert_array_equal(shape(free), wanted(free))
+    assert list(surface["lift"]) == [0.2] * 12
+
+
+def test_moldline_that_was_stopped_is_started_again(free):
+    session.client().shutdown()
+    handles.of_stage(free, 0).data.vertices[3].co.z += 0.5
+    following.settle()
+    assert project.values(free)["lift"][3] == pytest.approx(0.5, abs=1e-6)
+    np.testing.assert_array_equal(shape(free), wanted(free))
+
+
+def test_a_surface_that_is_edited_is_not_overwritten(scene):
+    surface = project.surface(scene)
+    project.set_values(scene, {"lift": [0.1, 0.1]})
+    edit(surface, 0, (0.0, 0.0, 3.0))
+    following.settle()
+    bpy.ops.object.mode_set(mode="OBJECT")
+    following.settle()
+    assert surface.data.vertices[0].co.z > 2.0
+    assert "edited by hand" in scene.moldline.status
+
+
+def test_a_surface_that_was_deleted_is_no_trouble(scene):
+    surface = project.surface(scene)
+    scene.collection.objects.unlink(surface)
+    project.set_values(scene, {"lift": [0.1, 0.1]})
+    following.settle()
+    assert project.surface(scene) is None
+    scene.collection.objects.link(surface)
+    following.settle()
+    np.testing.assert_array_equal(shape(scene), wanted(scene))
+
+
+def test_a_file_that_is_opened_again_goes_on(free, tmp_path):
+    project.set_values(free, {"lift": [0.1] * 12})
+    following.settle()
+    before = shape(free)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
+    found = bpy.context.scene
+    assert not project.is_open(found) and project.variables(found)
+    np.testing.assert_array_equal(shape(found), before)
+    handles.of_stage(found, 0).data.vertices[3].co.z += 0.5
+    following.settle()
+    assert project.values(found)["lift"][3] == pytest.approx(0.6, abs=1e-6)
+    assert len(handles.all_of(found)) == 1
+    np.testing.assert_array_equal(shape(found), wanted(found))

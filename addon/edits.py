@@ -104,6 +104,15 @@ def check_name(name: str, taken: Iterable[str], what: str) -> str:
     return name
 
 
+def check_size(name: str, table: Mapping[str, Any], size: int) -> None:
+    """A variable that is to move more has as many numbers as that takes."""
+    if size_of(table) != size:
+        raise Wrong(
+            f"{name!r} has {size_of(table)} numbers, what is chosen takes {size}; they must be "
+            f"as many to join"
+        )
+
+
 def check_bounds(lower: float, upper: float) -> list[float]:
     """A pair of bounds that leaves a choice."""
     if not lower < upper:

@@ -9,7 +9,7 @@ import numpy as np
 from bpy.props import BoolProperty
 from bpy.types import Operator
 
-from . import convert, edits, legend, measuring, project, session, view
+from . import convert, edits, following, legend, measuring, project, session, view
 from .amending import finished
 
 TICK = 0.25
@@ -21,7 +21,9 @@ class _State:
     """What is known of each scene, by its name."""
 
     seen: dict[str, Any] = field(default_factory=dict)
-    asked: dict[str, Any] = field(default_factory=dict)
+    read: dict[str, Any] = field(default_factory=dict)
+    painted: dict[str, Any] = field(default_factory=dict)
+    under_way: set[str] = field(default_factory=set)
     why: dict[str, str] = field(default_factory=dict)
     health: dict[str, dict[str, Any]] = field(default_factory=dict)
     shading: dict[tuple[str, int], str] = field(default_factory=dict)
@@ -48,31 +50,54 @@ def overview(scene: Any) -> dict[str, Any]:
 
 def refresh(scene: Any, failed: Any = None) -> None:
     """Ask for readings, and for colours where they are shown, at the values as they are."""
-    _now.asked[scene.name] = _key(scene)
-    _now.why.pop(scene.name, None)
+    _ask_readings(scene, failed)
+    if scene.moldline_view.is_coloured:
+        _ask_colours(scene, failed)
+
+
+def _ask_readings(scene: Any, failed: Any = None) -> None:
+    _now.read[scene.name] = _shape_key(scene)
+    if not edits.measures(view.case_of(scene)):
+        return
+    wrong, name = _wrong(scene, failed), scene.name
+    try:
+        case, values = project.case(scene), project.values(scene)
+    except session.Problem as problem:
+        wrong(problem)
+        return
+
+    def then(told: tuple) -> None:
+        _now.under_way.discard(name)
+        _now.why.pop(name, None)
+        measuring.read(bpy.data.scenes[name], *told)
+
+    _now.under_way.add(name)
+    session.run(
+        lambda _: (case.measures(values), case.beyond(values)), then=then, failed=wrong, what=""
+    )
+
+
+def _ask_colours(scene: Any, failed: Any = None) -> None:
+    _now.painted[scene.name] = _paint_key(scene)
+    wrong = _wrong(scene, failed)
+    try:
+        _paint(scene, project.case(scene), project.values(scene), wrong)
+    except session.Problem as problem:
+        wrong(problem)
+
+
+def _wrong(scene: Any, failed: Any) -> Any:
+    """What keeps a problem for the panel, and tells who asked."""
     name = scene.name
 
     def wrong(problem: Exception) -> None:
+        _now.under_way.discard(name)
         _now.why[name] = str(problem)
         view.redraw()
         if failed is not None:
             failed(problem)
 
-    try:
-        case = project.case(scene)
-    except session.Problem as problem:
-        wrong(problem)
-        return
-    values = project.values(scene)
-    if edits.measures(view.case_of(scene)):
-        session.run(
-            lambda _: (case.measures(values), case.beyond(values)),
-            then=lambda told: measuring.read(bpy.data.scenes[name], *told),
-            failed=wrong,
-            what="measuring",
-        )
-    if scene.moldline_view.is_coloured:
-        _paint(scene, case, values, wrong)
+    return wrong
 
 
 def _paint(scene: Any, case: Any, values: dict[str, Any], failed: Any) -> None:
@@ -88,7 +113,7 @@ def _paint(scene: Any, case: Any, values: dict[str, Any], failed: Any) -> None:
         lambda _: case.colour(values, variable, number, how=how),
         then=lambda numbers: _painted(bpy.data.scenes[name], numbers, title, unit, how),
         failed=failed,
-        what="colouring",
+        what="",
     )
 
 
@@ -100,7 +125,7 @@ def _painted(scene: Any, numbers: np.ndarray, title: str, unit: str, how: str) -
     if surface is None or not scene.moldline_view.is_coloured or surface.mode == "EDIT":
         return
     if len(numbers) != len(surface.data.vertices):
-        _now.asked.pop(scene.name, None)  # a remade shape is on its way; then ask again
+        _now.painted.pop(scene.name, None)  # a remade shape is on its way; then ask again
         return
     largest = float(np.abs(numbers).max(initial=0.0)) or 1.0
     scale = legend.Scale(title, unit, largest, is_signed=how == "normal")
@@ -255,27 +280,35 @@ def _shape_key(scene: Any) -> Any:
     return text, tuple((name, np.asarray(v).tobytes()) for name, v in values.items())
 
 
-def _key(scene: Any) -> Any:
-    """What readings and colours depend on."""
-    chosen, told, surface = scene.moldline_view, scene.moldline, scene.moldline.surface
-    look = chosen.is_coloured and (view.active_variable(scene), told.active_number, chosen.how)
-    points = len(surface.data.vertices) if surface is not None and look else 0
-    return _shape_key(scene), look, points
+def _paint_key(scene: Any) -> Any:
+    """What colours depend on."""
+    told, surface = scene.moldline, scene.moldline.surface
+    look = view.active_variable(scene), told.active_number, scene.moldline_view.how
+    on = (len(surface.data.vertices), surface.mode) if surface is not None else ()
+    return _shape_key(scene), look, on
 
 
 def _watch() -> float:
-    """Blender's timer: when values have come to rest, ask for what shows them."""
+    """Blender's timer: readings follow the values, colours come when values have come to rest."""
     scene = getattr(bpy.context, "scene", None)
-    told = getattr(scene, "moldline", None)
-    if told is None or told.text is None or session.state() != "ready" or session.busy():
+    if scene is None or not hasattr(scene, "moldline") or not project.is_open(scene):
         return TICK
-    if not scene.moldline_view.is_coloured and not edits.measures(view.case_of(scene)):
-        return TICK
-    now = _key(scene)
-    rests, _now.seen[scene.name] = _now.seen.get(scene.name) == now, now
-    if rests and _now.asked.get(scene.name) != now:
-        refresh(scene)
+    name = scene.name
+    if _now.read.get(name) != _shape_key(scene) and name not in _now.under_way:
+        _ask_readings(scene)
+    if scene.moldline_view.is_coloured and not session.busy():
+        now = _paint_key(scene)
+        rests, _now.seen[name] = _now.seen.get(name) == now, now
+        if rests and _now.painted.get(name) != now:
+            _ask_colours(scene)
     return TICK
+
+
+def _shape_came(scene: Any, shape: Any) -> None:
+    """A shape that brings its measures along spares asking for them."""
+    if getattr(shape, "measures", None) is not None:
+        _now.read[scene.name] = _shape_key(scene)
+        measuring.read(scene, shape.measures, shape.beyond)
 
 
 def _looked(scene: Any) -> None:
@@ -287,10 +320,20 @@ def _looked(scene: Any) -> None:
 @bpy.app.handlers.persistent
 def _loaded(*_: Any) -> None:
     """Another file: nothing that is known holds, but colours that were on come again."""
-    for known in (_now.seen, _now.asked, _now.why, _now.health):
+    _forget()
+
+
+def _forget() -> None:
+    for known in (_now.seen, _now.read, _now.painted, _now.why, _now.health, _now.under_way):
         known.clear()
     measuring.forget()
     legend.hide()
+
+
+def _again() -> None:
+    """Moldline is there again: ask once more."""
+    for known in (_now.read, _now.painted, _now.why, _now.under_way):
+        known.clear()
 
 
 CLASSES = (
@@ -307,6 +350,8 @@ def register() -> None:
     for one in CLASSES:
         bpy.utils.register_class(one)
     view.on_look(_looked)
+    following.on_shape(_shape_came)
+    session.on_ready(_again)
     bpy.app.handlers.load_post.append(_loaded)
     if not bpy.app.background:
         bpy.app.timers.register(_watch, first_interval=1.0, persistent=True)
@@ -319,8 +364,8 @@ def unregister() -> None:
     if _loaded in bpy.app.handlers.load_post:
         bpy.app.handlers.load_post.remove(_loaded)
     show_attribute(False)
-    for known in (_now.seen, _now.asked, _now.why, _now.health, _now.shading):
-        known.clear()
+    _forget()
+    _now.shading.clear()
     for one in reversed(CLASSES):
         bpy.utils.unregister_class(one)
     measuring.unregister()

@@ -171,6 +171,7 @@ class MOLDLINE_OT_add_variable(Operator):
             made = make(client, opened)
             link = edits.new_link(stage, name, made.link)
             if name in known:
+                edits.check_size(name, known[name], made.size)
                 return link
             table = made.table or edits.variable_table(made.size, 0.0, bounds, unit, typical)
             return [{"set": ["variable", name], "to": table}, *link]

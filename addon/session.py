@@ -4,7 +4,6 @@
 Threads talk to the server only; whatever touches Blender's data runs on its main thread.
 """
 
-import contextlib
 import queue
 import threading
 import time
@@ -251,14 +250,16 @@ def _made(problem: str) -> None:
 
 
 def _shut(found: Client) -> None:
-    """Stop the server behind a client, and wait until it is gone."""
-    with contextlib.suppress(ServerError, OSError):  # it may be gone already, or not ours to stop
+    """Stop the server behind a client, and wait until it has taken its socket away."""
+    try:
         other = Client(found.address, timeout=10.0, shared=False)  # the other one may be busy
         other.shutdown()
+    except (ServerError, OSError):  # gone already, or not ours to stop
+        return
     where = Place.of(_now.where.socket if _now.where else None)
     deadline = time.monotonic() + 10.0
-    while where.answers() and time.monotonic() < deadline:
-        time.sleep(0.05)
+    while where.path.exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
 
 
 def _connected(where: Where) -> Client:

@@ -73,18 +73,29 @@ def _run(command: list[str]) -> None:
 
 
 def _extension_command() -> list[str]:
-    """Blender's `extension` command: the program's, or that of Blender as a module."""
-    program = os.environ.get("BLENDER") or shutil.which("blender")
-    if program:
-        told = subprocess.run([program, "--version"], capture_output=True, text=True).stdout
-        found = re.search(r"Blender (\d+)\.(\d+)", told)
-        if found and (int(found[1]), int(found[2])) >= (4, 2):
-            return [program, "--command", "extension"]
-    inside = "bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py"
-    for python in (Path(sys.executable), TOP / ".venv-blender/bin/python"):
-        for script in python.parent.parent.glob(f"[lL]ib/**/site-packages/{inside}"):
-            return [str(python), str(script)]
-    sys.exit("no Blender 4.2 or later on PATH or as BLENDER, no .venv-blender (`make blender`)")
+    """Blender's `extension` command: this Python's, the program's, or that of .venv-blender."""
+    return (
+        _of_module(Path(sys.executable))
+        or _of_program(os.environ.get("BLENDER") or shutil.which("blender"))
+        or _of_module(TOP / ".venv-blender/bin/python")
+        or sys.exit("no Blender 4.2 or later on PATH or as BLENDER, no .venv-blender: make blender")
+    )
+
+
+def _of_program(program: str | None) -> list[str]:
+    told = (
+        subprocess.run([program, "--version"], capture_output=True, text=True) if program else None
+    )
+    found = re.search(r"Blender (\d+)\.(\d+)", told.stdout) if told else None
+    is_new = found is not None and (int(found[1]), int(found[2])) >= (4, 2)
+    return [str(program), "--command", "extension"] if is_new else []
+
+
+def _of_module(python: Path) -> list[str]:
+    """The command of Blender as a module, which needs no more than Python itself."""
+    inside = "site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py"
+    found = [*python.parents[1].glob(f"lib/*/{inside}"), *python.parents[1].glob(f"Lib/{inside}")]
+    return [str(python), str(found[0])] if found else []
 
 
 def main() -> None:

@@ -1,11 +1,12 @@
 """Numbers of variables that bring points where they are wanted, within bounds."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import scipy.sparse
 
+from .._types import Array
 from ..parameters.variable import Variable
 
 STAY = 1e-4
@@ -35,7 +36,7 @@ class Reach:
         self._kept: OrderedDict[bytes, np.ndarray] = OrderedDict()
         self._is_separate: bool | None = None
 
-    def numbers(self, values: dict[str, np.ndarray]) -> np.ndarray:
+    def numbers(self, values: Mapping[str, Array]) -> np.ndarray:
         """Their numbers among the values."""
         return _joined([values[v.name] for v in self.variables])
 
@@ -130,6 +131,9 @@ def fitted(
     where they do not help.
     """
     numbers, here = np.clip(start, reach.lower, reach.upper), places(start)
+    if is_fixed:  # then no more places need be asked for
+        fixed, first, begin = slopes(start), here, start
+        slopes, places = lambda x: fixed, lambda x: first + _apart(fixed @ (x - begin))
     if touched is None:
         far = np.linalg.norm(moved - here, axis=1)
         touched = far > SLIGHT * np.abs(moved).max(initial=0.0)
@@ -173,5 +177,9 @@ def _descended(
     return numbers, wish
 
 
-def _joined(parts: Sequence[Sequence[float] | np.ndarray]) -> np.ndarray:
+def _apart(coordinates: np.ndarray) -> np.ndarray:
+    return coordinates.reshape(-1, 3)
+
+
+def _joined(parts: Sequence[Sequence[float] | Array]) -> np.ndarray:
     return np.concatenate([np.zeros(0), *(np.asarray(part, float) for part in parts)])

@@ -70,14 +70,14 @@ class Hand:
             "labels": self.labels,
         }
 
-    def rest(self, full: Mapping[str, np.ndarray]) -> np.ndarray:
+    def rest(self, full: Mapping[str, Array]) -> np.ndarray:
         """Places before the stages, (p, 3)."""
         if self._net is not None:
             return np.asarray(self._net.rest, float).reshape(-1, 3)
         assert self._marks is not None
         return self._marks.rest(self._source(full))
 
-    def places(self, full: Mapping[str, np.ndarray]) -> np.ndarray:
+    def places(self, full: Mapping[str, Array]) -> np.ndarray:
         """Where values put its points, (p, 3)."""
         controls = self.stage.controls(full)
         if self._net is not None:
@@ -90,7 +90,7 @@ class Hand:
         rest = self._marks.rest(None)
         return self._carried(rest, full) + (self._marks.places(controls, None, None) - rest)
 
-    def slopes(self, full: Mapping[str, np.ndarray]) -> scipy.sparse.csc_array:
+    def slopes(self, full: Mapping[str, Array]) -> scipy.sparse.csc_array:
         """Motion of its points for a unit of each number a hand turns, (3 p, v)."""
         if self._net is not None:
             return self._fixed
@@ -124,27 +124,27 @@ class Hand:
         """Of a net, whose points move by the controls themselves."""
         return scipy.sparse.csc_array(self._matrix * ~np.repeat(self.frozen, 3)[:, None])
 
-    def _source(self, full: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _source(self, full: Mapping[str, Array]) -> np.ndarray:
         return np.asarray(self._pipeline.source(full))
 
-    def _steps(self, full: Mapping[str, np.ndarray]) -> list[Step]:
+    def _steps(self, full: Mapping[str, Array]) -> list[Step]:
         """What moves points before this stage."""
         before = self._pipeline.own_stages[: self._place]
         return [s for s in self._pipeline.steps(full) if any(s.stage is own for own in before)]
 
-    def _carried(self, rest: np.ndarray, full: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _carried(self, rest: np.ndarray, full: Mapping[str, Array]) -> np.ndarray:
         """Where the stages before take places along with the points; nowhere unless carried."""
         if not self.stage.carried or not self._place:
             return rest
         return self._after(rest, full)
 
-    def _after(self, rest: np.ndarray, full: Mapping[str, np.ndarray]) -> np.ndarray:
+    def _after(self, rest: np.ndarray, full: Mapping[str, Array]) -> np.ndarray:
         place: Array = jnp.asarray(rest)
         for step in self._steps(full):
             place = step.after(rest, place)
         return np.asarray(place)
 
-    def _shapes(self, full: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _shapes(self, full: Mapping[str, Array]) -> tuple[np.ndarray, np.ndarray]:
         """Points of the geometry that the stage sees, and where they are before it."""
         rest = self._source(full)
         present = self._after(rest, full) if self._place else rest

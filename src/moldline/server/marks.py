@@ -40,19 +40,15 @@ class AbstractMarks(abc.ABC):
     labels: list[str]
 
     @abc.abstractmethod
-    def rest(self, source: np.ndarray | None) -> np.ndarray:
+    def rest(self, source: Array | None) -> np.ndarray:
         """Where they are before any stage, (p, 3), given the points there."""
 
     @abc.abstractmethod
-    def places(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def places(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         """Where controls put them, (p, 3), given the shape that the stage sees, and the present."""
 
     @abc.abstractmethod
-    def slopes(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def slopes(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         """Their motion for a unit of each control, (3 p, k)."""
 
 
@@ -66,19 +62,15 @@ class BoneMarks(AbstractMarks):
         self._sloped = jax.jit(jax.jacfwd(moving))
 
     @override
-    def rest(self, source: np.ndarray | None) -> np.ndarray:
+    def rest(self, source: Array | None) -> np.ndarray:
         return self._rest
 
     @override
-    def places(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def places(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         return np.asarray(self._moving(controls))
 
     @override
-    def slopes(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def slopes(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         return np.asarray(self._sloped(controls)).reshape(-1, len(controls))
 
 
@@ -111,21 +103,17 @@ class PilotMarks(AbstractMarks):
         self._sloped = jax.jit(jax.jacfwd(moving))
 
     @override
-    def rest(self, source: np.ndarray | None) -> np.ndarray:
+    def rest(self, source: Array | None) -> np.ndarray:
         assert source is not None
         found = self._marked(jnp.asarray(source)[self._reads])
         return np.concatenate([np.zeros((0, 3)), *found])
 
     @override
-    def places(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def places(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         return np.asarray(self._moving(controls, seen, present))
 
     @override
-    def slopes(
-        self, controls: Array, seen: np.ndarray | None, present: np.ndarray | None
-    ) -> np.ndarray:
+    def slopes(self, controls: Array, seen: Array | None, present: Array | None) -> np.ndarray:
         found = np.asarray(self._sloped(controls, seen, present))
         return found.reshape(-1, len(controls))
 

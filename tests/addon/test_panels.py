@@ -16,6 +16,7 @@ from bl_ext.user_default.moldline import (
     view,
 )
 
+BLENDERS = {"ending", "filepath", "check_existing", "files", "directory"}
 CONTAINERS = {"row", "column", "box", "split", "grid_flow", "column_flow"}
 
 
@@ -29,9 +30,7 @@ class Layout:
         def call(*given, **named):
             self.calls.append((name, given, named))
             if name == "operator":
-                assert hasattr(
-                    bpy.types, given[0].upper().replace(".", "_OT_", 1)[:9] + given[0][9:]
-                )
+                assert hasattr(bpy.types, "MOLDLINE_OT_" + given[0].removeprefix("moldline."))
                 return SimpleNamespace()
             if name == "prop":
                 assert given[1] in given[0].bl_rna.properties or given[1].startswith('["')
@@ -122,6 +121,8 @@ def test_a_lost_moldline_leaves_all_that_is_known(scene):
 
 def test_a_text_that_is_no_case_is_drawn_as_none(scene):
     scene.moldline.text.from_string("moldline = [[[")
+    assert view.is_stale(scene)
+    view.sync(scene)
     found = drawn()
     assert not [text for text in found["MOLDLINE_PT_variables"].texts() if "lift" in text]
 
@@ -146,19 +147,15 @@ def test_a_draw_that_fails_is_a_line():
 
 
 def test_every_operator_and_property_has_a_tooltip():
-    kinds = [
-        kind
-        for name in dir(bpy.types)
-        if name.startswith("MOLDLINE_OT_")
-        for kind in [getattr(bpy.types, name)]
-    ]
-    assert len(kinds) > 10
-    for kind in kinds:
-        assert kind.bl_rna.description, kind
-        assert not kind.bl_rna.description.endswith("."), kind
-        for name, held in kind.bl_rna.properties.items():
-            if name not in bpy.types.Operator.bl_rna.properties and not held.is_hidden:
-                assert held.description, f"{kind.__name__}.{name}"
+    operators = [getattr(bpy.ops.moldline, name) for name in dir(bpy.ops.moldline)]
+    assert len(operators) > 10
+    for operator in operators:
+        told = operator.get_rna_type()
+        assert told.description and not told.description.endswith("."), told.identifier
+        for name, held in told.properties.items():
+            if name != "rna_type" and not held.is_hidden:
+                is_blenders = name.startswith("filter_") or name in BLENDERS
+                assert held.description or is_blenders, f"{told.identifier}.{name}"
 
 
 def test_what_is_shown_can_be_translated():

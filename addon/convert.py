@@ -268,6 +268,9 @@ def _kept(faces: np.ndarray) -> np.ndarray:
 
 def _loops(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Corners one after the other, and where each face begins."""
+    if faces.shape[1] == 3:
+        corners = np.ascontiguousarray(faces, np.int32).reshape(-1)
+        return corners, np.arange(0, len(corners), 3, dtype=np.int32)
     sizes = np.where(_is_triangle(faces), 3, 4)
     is_corner = np.arange(faces.shape[1]) < sizes[:, None]
     corners = np.ascontiguousarray(faces[is_corner], np.int32)

@@ -18,6 +18,9 @@ OLDEST = (3, 11)
 
 _PROBE = "import sys, venv, ensurepip; print(*sys.version_info[:2])"
 
+_QUIETLY = {"creationflags": 0x08000000} if os.name == "nt" else {}
+"""Without a console window for each command, on Windows."""
+
 _LOG: deque[str] = deque(maxlen=200)
 _making: threading.Thread | None = None
 
@@ -90,12 +93,8 @@ def progress() -> str:
     return _LOG[-1] if is_making() and _LOG else ""
 
 
-def make(then: Callable[[str], None] | None = None) -> None:
-    """Make the environment in the background; `then` is told in that thread what went wrong, or "".
-
-    What can be told at once is raised.
-    """
-    global _making
+def check() -> None:
+    """Raise what stands against making one now."""
     if is_making():
         raise Unmade("the environment is being made already")
     if not bpy.app.online_access:
@@ -103,6 +102,15 @@ def make(then: Callable[[str], None] | None = None) -> None:
             "Blender may not go online: allow it in Preferences > System > Network, or name the "
             "Python of an environment that has moldline in the add-on's preferences"
         )
+
+
+def make(then: Callable[[str], None] | None = None) -> None:
+    """Make the environment in the background; `then` is told in that thread what went wrong, or "".
+
+    What can be told at once is raised.
+    """
+    global _making
+    check()
     where, own = folder(), wheel()
     _LOG.clear()
     _making = threading.Thread(target=_make, args=(where, own, then), daemon=True)
@@ -155,7 +163,12 @@ def base_python() -> str:
     for program in _candidates():
         try:
             told = subprocess.run(
-                [program, "-c", _PROBE], capture_output=True, text=True, timeout=60, env=_clean()
+                [program, "-c", _PROBE],
+                capture_output=True,
+                text=True,
+                timeout=60,
+                env=_clean(),
+                **_QUIETLY,
             )
         except (OSError, subprocess.TimeoutExpired) as error:
             seen.append(f"{program}: {error}")
@@ -194,6 +207,7 @@ def _told(command: list[str], complaint: str) -> None:
             text=True,
             errors="replace",
             env=_clean(),
+            **_QUIETLY,
         )
     except OSError as error:
         raise Unmade(f"{complaint}: {error}") from None
@@ -212,7 +226,11 @@ def _works(program: Path) -> bool:
         return False
     try:
         told = subprocess.run(
-            [str(program), "-m", "pip", "--version"], capture_output=True, timeout=60, env=_clean()
+            [str(program), "-m", "pip", "--version"],
+            capture_output=True,
+            timeout=60,
+            env=_clean(),
+            **_QUIETLY,
         )
     except (OSError, subprocess.TimeoutExpired):
         return False

@@ -186,12 +186,18 @@ def stop() -> None:
 
 def forget() -> None:
     """Leave the server that there is; what is wanted next connects again."""
-    with _connecting:
+    if not _connecting.acquire(blocking=False):
+        return  # a thread is starting one just now; the next job sees that it is another
+    try:
         for one in (_now.client, _now.live):
-            if one is not None:
+            if one is not None and busy():  # it is in a thread's hands: nobody waits for that
+                threading.Thread(target=one.close, daemon=True).start()
+            elif one is not None:
                 one.close()
         _now.client = _now.live = _now.where = None
         _now.why, _now.generation = "", 0
+    finally:
+        _connecting.release()
 
 
 def met(error: Exception) -> Problem:
@@ -229,6 +235,9 @@ def make_environment() -> None:
         _done.put(lambda: _made(problem))
 
     try:
+        environment.check()
+        if _now.client is not None:
+            _shut(_now.client)  # its files are about to be replaced
         environment.make(made)
     except environment.Unmade as problem:
         _now.why = str(problem)
@@ -246,7 +255,7 @@ def _made(problem: str) -> None:
         window.tell(Problem(problem, "environment"))
         return
     _now.why = ""
-    restart() if _now.client is not None else start()
+    start()
 
 
 def _shut(found: Client) -> None:
@@ -268,7 +277,7 @@ def _connected(where: Where) -> Client:
         _now.is_starting = _now.client is None or bool(_now.why)
         try:
             if _now.client is not None and _now.where == where:
-                _now.client.ensure()  # the same client again, so that its cases stay of use
+                _reached(_now.client)  # the same client again, so that its cases stay of use
             else:
                 forget()
                 _now.client, _now.where = where.start(), where
@@ -277,6 +286,16 @@ def _connected(where: Where) -> Client:
         _now.why = ""
         _look()
         return _now.client
+
+
+def _reached(found: Client) -> None:
+    """Connect again where the server went away unnoticed."""
+    try:
+        found.ping()
+    except ServerError as error:
+        if error.code != "disconnected":
+            raise
+        found.ensure()
 
 
 def _look() -> None:

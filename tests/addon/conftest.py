@@ -61,7 +61,10 @@ def pytest_configure():
     """Build, install and switch on, before any test module is imported."""
     if not _HAS_BLENDER:
         return
-    os.environ["BLENDER_USER_RESOURCES"] = str(_FOLDER / "blender")
+    if "bpy" not in sys.modules:  # else we are inside a Blender that was told its folder
+        os.environ["BLENDER_USER_RESOURCES"] = str(_FOLDER / "blender")
+    if "BLENDER_USER_RESOURCES" not in os.environ:
+        pytest.exit("set BLENDER_USER_RESOURCES to a folder that may be thrown away", 1)
     import bpy
 
     made = subprocess.run(

@@ -75,9 +75,10 @@ def test_a_server_that_crashed_is_started_again_and_told(ball_case):
     again = []
     session.on_ready(lambda: again.append(True))
     crash(session.client())
-    session.run(lambda _: case.points())
+    session.run(lambda client: client.cases())
     session._flush()
     assert again and session.state() == "ready"
+    assert case.points().shape == (258, 3)
 
 
 def test_a_server_that_is_lost_in_the_middle_is_told_with_the_remedy(ball_case):
@@ -170,6 +171,17 @@ def test_what_was_asked_before_another_file_was_opened_is_told_to_nobody(window)
     bpy.ops.wm.read_homefile(use_empty=True)
     until(lambda: not session.busy(), window)
     assert not told
+
+
+def test_a_restart_in_a_window_gives_up_what_is_under_way(window):
+    session.start()
+    until(lambda: session.state() == "ready" and not session.busy(), window)
+    told, again = [], []
+    session.run(lambda client: client.wait(-1), failed=told.append)  # which never comes
+    time.sleep(0.2)
+    session.restart(lambda: again.append(session.state()))
+    until(lambda: again, window)
+    assert again == ["ready"] and "press 'Restart'" in str(told[-1])
 
 
 def test_in_a_window_what_goes_wrong_without_a_listener_is_no_exception(window, capsys):

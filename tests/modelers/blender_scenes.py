@@ -70,6 +70,7 @@ def keys():
     body = column()
     body.shape_key_add(name="Basis")
     swell = body.shape_key_add(name="Swell")
+    swell.value = 0.0
     for k, point in enumerate(swell.data):
         point.co.x += 0.1 * k
     for name in ("skin", "glass"):

@@ -26,7 +26,7 @@ def scene(scenes, blender):
 
     def make(name, object="wing", **options):
         one = Blender(
-            scenes / f"{name}.blend", object, **{"workers": 2, "python": blender} | options
+            scenes / f"{name}.blend", object, **{"workers": 1, "python": blender} | options
         )
         made.append(one)
         return one

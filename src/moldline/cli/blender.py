@@ -17,7 +17,7 @@ def configure(command: argparse.ArgumentParser) -> None:
     make = actions.add_parser(
         "make", help="make an environment of its own with Blender as a Python module (800 MB)"
     )
-    make.add_argument("--version", default="4.5", help="of Blender: 4.5 or 5.2 (4.5)")
+    make.add_argument("--release", default="4.5", help="of Blender: 4.5 or 5.2 (4.5)")
     make.add_argument(
         "--folder", type=Path, help="where; else in this user's cache, where it is found again"
     )
@@ -39,8 +39,8 @@ def _make(given: argparse.Namespace) -> int:
     from ..modelers.blender_found import VARIABLE
     from ..modelers.blender_making import make
 
-    python = make(given.version, given.folder)
-    print(f"Blender {given.version} is in {python.parent.parent}")
+    python = make(given.release, given.folder)
+    print(f"Blender {given.release} is in {python.parent.parent}")
     if given.folder is not None:
         print(f"it is found with {VARIABLE}={python}, or with python = {str(python)!r} in a stage")
     return 0

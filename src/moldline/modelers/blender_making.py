@@ -38,14 +38,20 @@ def make(version: str, folder: Path | None = None, say: Callable[[str], None] = 
     say(f"making {place}: Blender {version} as a Python module, 800 MB ...")
     place.parent.mkdir(parents=True, exist_ok=True)
     wanted = f"bpy=={version}.*"
-    uv = _uv()
+    uv, own = _uv(), _python(VERSIONS[version])
     if uv is not None:
-        _run([uv, "venv", "--quiet", "--clear", "--python", VERSIONS[version], str(place)])
+        _run([uv, "venv", "--quiet", "--clear", "--python", own or VERSIONS[version], str(place)])
         _run([uv, "pip", "install", "--quiet", "--python", str(python), wanted])
-    else:
-        _run([str(_python(version)), "-m", "venv", "--clear", str(place)])
+    elif own is not None:
+        _run([own, "-m", "venv", "--clear", str(place)])
         pip = [str(python), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
         _run([*pip, wanted])
+    else:
+        raise ParameterError(
+            f"Blender {version} as a module needs Python {VERSIONS[version]} exactly, and there is "
+            "none on PATH, nor uv, which would fetch it (pip install uv); or install Blender "
+            "itself (blender.org) and put `blender` on PATH"
+        )
     problem = _problem(python)
     if problem is not None:
         raise TaskError(f"Blender is installed in {place} but does not import: {problem}")
@@ -91,9 +97,8 @@ def _uv() -> str | None:
     return shutil.which("uv") or (str(beside) if beside.exists() else None)
 
 
-def _python(version: str) -> Path:
+def _python(needed: str) -> str | None:
     """A Python of exactly the version that it needs."""
-    needed = VERSIONS[version]
     for name in (sys.executable, f"python{needed}", "python3", "python"):
         found = shutil.which(name)
         if found is None:
@@ -101,12 +106,8 @@ def _python(version: str) -> Path:
         code = "import sys; print('%d.%d' % sys.version_info[:2])"
         told = subprocess.run([found, "-c", code], capture_output=True, text=True)
         if told.stdout.strip() == needed:
-            return Path(found)
-    raise ParameterError(
-        f"Blender {version} as a module needs Python {needed} exactly, and there is none on PATH, "
-        f"nor uv, which would fetch it (pip install uv); or install Blender itself (blender.org) "
-        "and put `blender` on PATH"
-    )
+            return found
+    return None
 
 
 def _run(words: Sequence[str]) -> None:

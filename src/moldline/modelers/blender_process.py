@@ -10,8 +10,9 @@ import time
 import weakref
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from io import BufferedIOBase
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -90,7 +91,7 @@ class Process:
         self.setup: Setup | None = None
         self.opened: frames.Message = {}, {}
         self._answers: queue.SimpleQueue[frames.Message | None] = queue.SimpleQueue()
-        stream = cast(BinaryIO, self.process.stdout)
+        stream = cast(BufferedIOBase, self.process.stdout)
         threading.Thread(target=_listen, args=(stream, self._answers), daemon=True).start()
         try:
             self.version = self._answer(START)[0]["version"]
@@ -103,7 +104,7 @@ class Process:
     ) -> frames.Message:
         """Its answer; whatever it refuses is raised. It is ended where it takes too long."""
         try:
-            frames.write(cast(BinaryIO, self.process.stdin), told, arrays)
+            frames.write(cast(BufferedIOBase, self.process.stdin), told, arrays)
         except OSError:
             raise self._death() from None
         said, found = self._answer(limit)
@@ -152,7 +153,7 @@ class Process:
     def end(self, patience: float = 0.0) -> None:
         """Close its pipe, and kill it where it does not end by itself in that time [s]."""
         with contextlib.suppress(OSError):
-            cast(BinaryIO, self.process.stdin).close()
+            cast(BufferedIOBase, self.process.stdin).close()
         try:
             self.process.wait(patience)
         except subprocess.TimeoutExpired:
@@ -161,7 +162,7 @@ class Process:
         self._log.unlink(missing_ok=True)
 
 
-def _listen(stream: BinaryIO, answers: "queue.SimpleQueue[frames.Message | None]") -> None:
+def _listen(stream: BufferedIOBase, answers: "queue.SimpleQueue[frames.Message | None]") -> None:
     """Put answers where they are waited for, and None at the end."""
     with contextlib.suppress(OSError, ValueError):
         if frames.skip_to_hello(stream):

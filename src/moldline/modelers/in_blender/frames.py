@@ -3,7 +3,8 @@
 import json
 import struct
 from collections.abc import Mapping
-from typing import Any, BinaryIO
+from io import BufferedIOBase
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,9 @@ MAGIC = b"mlbl"
 Message = tuple[dict[str, Any], dict[str, np.ndarray]]
 
 
-def write(stream: BinaryIO, told: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+def write(
+    stream: BufferedIOBase, told: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
+) -> None:
     """Send a message."""
     plain = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
     forms = [[name, array.dtype.str, array.shape] for name, array in plain.items()]
@@ -27,7 +30,7 @@ def write(stream: BinaryIO, told: Mapping[str, Any], arrays: Mapping[str, np.nda
     stream.flush()
 
 
-def read(stream: BinaryIO) -> Message | None:
+def read(stream: BufferedIOBase) -> Message | None:
     """The next message; None where the stream has ended."""
     start = _bytes(stream, HEAD.size)
     if start is None:
@@ -49,7 +52,7 @@ def read(stream: BinaryIO) -> Message | None:
     return content["told"], arrays
 
 
-def skip_to_hello(stream: BinaryIO) -> bool:
+def skip_to_hello(stream: BufferedIOBase) -> bool:
     """Read past what is printed before the first message; False where the stream ends before."""
     seen = b""
     while not seen.endswith(HELLO):
@@ -60,11 +63,11 @@ def skip_to_hello(stream: BinaryIO) -> bool:
     return True
 
 
-def _bytes(stream: BinaryIO, count: int) -> bytearray | None:
+def _bytes(stream: BufferedIOBase, count: int) -> bytearray | None:
     found = bytearray(count)
     view, start = memoryview(found), 0
     while start < count:
-        part = stream.readinto(view[start:])  # type: ignore[attr-defined]
+        part = stream.readinto(view[start:])
         if not part:
             return None
         start += part

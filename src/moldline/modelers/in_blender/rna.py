@@ -2,7 +2,7 @@
 
 import re
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy  # type: ignore[import-not-found,unused-ignore]
 
@@ -18,6 +18,14 @@ KINDS = {"ROTATION": "angle", "LENGTH": "length"}
 FACTORS = ("FACTOR", "PERCENTAGE")
 
 
+class Step(NamedTuple):
+    """A part of a path: from what it goes on, and by a name, a key or an index."""
+
+    owner: Any
+    kind: str
+    last: Any
+
+
 @dataclass(frozen=True)
 class Place:
     """A property, or one number of one.
@@ -26,28 +34,26 @@ class Place:
     ----------
     path
         What it is called by.
-    owner, last
-        What has it, and by which name, key or index.
-    chain
-        What the path leads through, from the owner back.
+    steps
+        What the path leads through.
     """
 
     path: str
-    owner: Any
-    last: tuple[str, Any]
-    chain: tuple[Any, ...]
+    steps: tuple[Step, ...]
 
     @property
     def block(self) -> Any:
         """The data-block that it belongs to, which is told of changes."""
-        return next(one.id_data for one in self.chain if isinstance(one, bpy.types.bpy_struct))
+        return next(
+            step.owner.id_data
+            for step in reversed(self.steps)
+            if isinstance(step.owner, bpy.types.bpy_struct)
+        )
 
     def read(self) -> list[float]:
         """Its numbers."""
-        value = _step(self.owner, *self.last, self.path)
-        numbers: list[Any] = (
-            [value] if isinstance(value, (bool, int, float, str)) else _listed(value)
-        )
+        value = self._value
+        numbers: list[Any] = _listed(value)
         if not numbers or not all(type(number) is float for number in numbers):
             is_whole = numbers and all(isinstance(number, (bool, int)) for number in numbers)
             what = f"{value!r}, a whole number or a choice" if is_whole else f"{value!r}"
@@ -59,26 +65,26 @@ class Place:
 
     def write(self, numbers: list[float], is_list: bool) -> None:
         """Set it."""
-        kind, last = self.last
+        owner, kind, last = self.steps[-1]
         value: Any = numbers if is_list else numbers[0]
         if kind == "name":
-            setattr(self.owner, last, value)
+            setattr(owner, last, value)
         else:
-            self.owner[last] = value
+            owner[last] = value
 
     @property
     def is_list(self) -> bool:
         """Whether it has several numbers."""
-        return not isinstance(_step(self.owner, *self.last, self.path), float)
+        return not isinstance(self._value, float)
 
     @property
     def limits(self) -> tuple[float, float]:
         """Between which Blender keeps it."""
-        form = self._form
+        form, owner = self._form, self._whole.owner
         if form is None:
             return float("-inf"), float("inf")
-        if isinstance(self.owner, bpy.types.ShapeKey) and form.identifier == "value":
-            return self.owner.slider_min, self.owner.slider_max
+        if isinstance(owner, bpy.types.ShapeKey) and form.identifier == "value":
+            return owner.slider_min, owner.slider_max
         least, most = form.hard_min, form.hard_max
         return (
             least if least > -1e30 else float("-inf"),
@@ -91,42 +97,37 @@ class Place:
         form = self._form
         if form is None:
             return "number"
-        is_factor = form.subtype in FACTORS or isinstance(self.owner, bpy.types.ShapeKey)
+        is_factor = form.subtype in FACTORS or isinstance(self._whole.owner, bpy.types.ShapeKey)
         return "factor" if is_factor else KINDS.get(form.unit, "number")
 
     @property
     def driver(self) -> str:
         """The expression of a driver that sets it; "" where there is none."""
-        found = getattr(self.block, "animation_data", None)
-        own = self._own_path
-        for curve in found.drivers if found else ():
-            if curve.data_path == own and self.last[1] in (curve.array_index, *self._names):
+        animation = getattr(self.block, "animation_data", None)
+        owner, kind, last = self._whole
+        start = "" if owner == self.block else owner.path_from_id()
+        own = f'{start}["{last}"]' if kind == "key" else f"{start}.{last}".removeprefix(".")
+        index = self.steps[-1].last if self.steps[-1].kind == "index" else None
+        for curve in animation.drivers if animation else ():
+            if curve.data_path == own and index in (None, curve.array_index):
                 return curve.driver.expression or "(no expression)"
         return ""
 
     @property
-    def _names(self) -> tuple[Any, ...]:
-        return () if self.last[0] == "index" else (self.last[1],)
+    def _value(self) -> Any:
+        return _step(*self.steps[-1], self.path)
 
     @property
-    def _own_path(self) -> str:
-        """Its path from its data-block."""
-        holder, last = self.owner, self.last
-        if last[0] == "index" and len(self.chain) > 1:
-            tail = PART.findall(self.path)[-2]
-            holder, last = self.chain[1], ("name", tail[0]) if tail[0] else ("key", tail[3])
-        start = "" if holder == self.block else holder.path_from_id()
-        if last[0] == "key":
-            return f'{start}["{last[1]}"]'
-        return f"{start}.{last[1]}" if start else str(last[1])
+    def _whole(self) -> Step:
+        """The property, where the path is of one of its numbers."""
+        is_part = self.steps[-1].kind == "index" and len(self.steps) > 1
+        return self.steps[-2] if is_part else self.steps[-1]
 
     @property
     def _form(self) -> Any:
         """What Blender says about the property; None of one that users have added."""
-        owner, (kind, last) = self.owner, self.last
-        if kind == "index" and len(self.chain) > 1:
-            owner, last = self.chain[1], PART.findall(self.path)[-2][0]
-        if kind == "key" or not isinstance(owner, bpy.types.bpy_struct):
+        owner, kind, last = self._whole
+        if kind != "name" or not isinstance(owner, bpy.types.bpy_struct):
             return None
         form = owner.bl_rna.properties.get(last)
         return form if form is not None and form.type == "FLOAT" else None
@@ -135,7 +136,8 @@ class Place:
 def place(path: str) -> Place:
     """Find a property by its path from bpy.data."""
     text = path.strip().removeprefix("bpy.data.")
-    parts, end = [], 0
+    steps: list[Step] = []
+    owner, end = bpy.data, 0
     while end < len(text):
         match = PART.match(text, end)
         if match is None:
@@ -146,21 +148,15 @@ def place(path: str) -> Place:
             )
         found = match.groupdict()
         kind = next(k for k in ("name", "index", "key") if found[k] is not None)
-        parts.append((kind, int(found[kind]) if kind == "index" else found[kind]))
-        end = match.end()
-    if len(parts) < 2:
+        last: Any = int(found[kind]) if kind == "index" else found[kind]
+        step = Step(owner, kind, last)
+        if kind == "key" and isinstance(owner, bpy.types.NodesModifier):
+            step = _input(owner, last, path)
+        owner, end = _step(*step, path), match.end()
+        steps.append(step)
+    if len(steps) < 2:
         raise Wrong("parameter", f"{path!r} leads to no property of anything")
-    owner: Any = bpy.data
-    chain: list[Any] = []
-    for kind, last in parts[:-1]:
-        owner = _step(owner, kind, last, path)
-        chain.insert(0, owner)
-    kind, last = parts[-1]
-    if kind == "key" and isinstance(owner, bpy.types.NodesModifier):
-        last = _socket(owner, last, path)
-    found_place = Place(path, owner, (kind, last), tuple(chain))
-    _step(owner, kind, last, path)
-    return found_place
+    return Place(path, tuple(steps))
 
 
 def _step(owner: Any, kind: str, last: Any, path: str) -> Any:
@@ -202,22 +198,24 @@ def sockets(modifier: Any) -> list[tuple[str, str]]:
     ]
 
 
-def _socket(modifier: Any, key: Any, path: str) -> str:
-    """Identifier of an input of geometry nodes, by itself or by the name that users see."""
-    if key in modifier.keys():  # noqa: SIM118, it is no dictionary
-        return key
+def _input(modifier: Any, key: str, path: str) -> Step:
+    """An input of geometry nodes, by its identifier or by the name that users see."""
     known = sockets(modifier)
-    found = [identifier for identifier, name in known if name == key]
+    found = [identifier for identifier, name in known if key in (identifier, name)]
     if len(found) != 1:
         raise Wrong(
             "parameter",
             f"{path}: {len(found)} inputs of the modifier {modifier.name!r} are named {key!r}; "
             f"{there_are([name for _, name in known])}",
         )
-    return found[0]
+    if hasattr(modifier, "properties"):  # Blender 5.2 and later
+        return Step(getattr(modifier.properties.inputs, found[0]), "name", "value")
+    return Step(modifier, "key", found[0])
 
 
 def _listed(value: Any) -> list[Any]:
+    if isinstance(value, (bool, int, float, str)):
+        return [value]
     try:
         return list(value)
     except TypeError:

@@ -3,7 +3,8 @@
 import os
 import sys
 import traceback
-from typing import Any, BinaryIO
+from io import BufferedIOBase
+from typing import Any
 
 from . import frames
 from .wrong import Wrong
@@ -27,7 +28,7 @@ def main() -> None:
     os._exit(0)  # bpy may hang while the interpreter cleans up
 
 
-def serve(requests: BinaryIO, answers: BinaryIO, session: Any) -> None:
+def serve(requests: BufferedIOBase, answers: BufferedIOBase, session: Any) -> None:
     """Answer until there is nothing more to read."""
     answers.write(frames.HELLO)
     frames.write(answers, {"version": session.version}, {})

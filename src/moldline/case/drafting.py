@@ -1,5 +1,6 @@
 """A case's text with one more stage, and a case's text put elsewhere."""
 
+import json
 import math
 import re
 import shutil
@@ -56,6 +57,7 @@ def drafted(
 
     What the stage needs beside the case file is written into the folder.
     """
+    options = {name: _tupled(one) for name, one in options.items()}
     if not folder.is_dir():
         raise FileError(f"{folder}: is no folder; make it first")
     if text.strip():
@@ -126,6 +128,7 @@ def _added(
     own = {"on": name} if len(names) > 1 else {}
     head = {key: value for key, value in draft.stage.items() if key == "deformer"}
     table = {**head, **own, **draft.stage, "link": draft.links}
+    table = json.loads(json.dumps(table))  # tuples are lists in a case
     edits: list[dict[str, Any]] = [
         {"set": ["variable", key], "to": value} for key, value in draft.variables.items()
     ]
@@ -145,6 +148,11 @@ def _geometry(text: str, folder: Path, tables: schema.CaseTable, name: str) -> G
         except MoldlineError as error:
             raise CaseError(f"{TOLD}: geometry.{name}.file: {error}") from None
     return of_text(text, folder).pipeline.branches[name].geometry
+
+
+def _tupled(given: Any) -> Any:
+    """Lists, as headers have them, as tuples, as Python's interface wants them."""
+    return tuple(map(_tupled, given)) if isinstance(given, list) else given
 
 
 def _beside(draft: Draft, folder: Path, name: str, units: str | None) -> None:

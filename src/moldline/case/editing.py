@@ -25,7 +25,7 @@ MOST = 1000
 _HEADER = re.compile(r"\[.*\]\s*(#.*)?")
 
 
-def amended(text: str, edits: Sequence[Mapping[str, Any]]) -> str:
+def amended(text: str, edits: Sequence[Any]) -> str:
     """A case's text with some edits, one after the other, validated as a case file is.
 
     An edit is {"set": path, "to": value}, {"remove": path}, {"append": path, "value": one more} or
@@ -43,7 +43,7 @@ def amended(text: str, edits: Sequence[Mapping[str, Any]]) -> str:
     return found
 
 
-def _styled(text: str, edits: Sequence[Mapping[str, Any]], wanted: dict[str, Any]) -> str:
+def _styled(text: str, edits: Sequence[Any], wanted: dict[str, Any]) -> str:
     """The edits made in the text as it is written; written anew where that cannot be."""
     try:
         document = tomlkit.parse(text)
@@ -59,7 +59,7 @@ def _styled(text: str, edits: Sequence[Mapping[str, Any]], wanted: dict[str, Any
     return spaced if tomllib.loads(spaced) == wanted else found
 
 
-def _edit(tree: Any, edit: Mapping[str, Any], where: str, made: Callable[[Any], Any]) -> None:
+def _edit(tree: Any, edit: Any, where: str, made: Callable[[Any], Any]) -> None:
     """Make one edit in tables, of which new parts are made by a function."""
     verb, path, value = _read(edit, where)
     told = ".".join(map(str, path))

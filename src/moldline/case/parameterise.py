@@ -237,20 +237,33 @@ def pilots(
         raise ParameterError(f"{len(places)} spots need as many different names, got {chosen}")
     if odd := [one for one in chosen if not isinstance(one, str) or not one.isidentifier()]:
         raise ParameterError(f"a pilot's name is a word without spaces, got {odd[0]!r}")
-    way = along if isinstance(along, str) or along is None else [float(x) for x in along]
+    way = along if isinstance(along, str) or along is None else _direction(along)
     own: dict[str, Any] = {} if way is None else {"along": way}
-    found = {name: {"near": row} for name, row in zip(chosen, places.tolist(), strict=True)}
-    held = {n: Position.build(geometry, spot=s, **own) for n, s in found.items()}  # type: ignore
+    rows = [(float(x), float(y), float(z)) for x, y, z in places]
+    held = {
+        name: Position.build(geometry, spot={"near": row}, along=way)
+        for name, row in zip(chosen, rows, strict=True)
+    }
     size = sum(one.size for one in held.values())
     draft = Draft(
         {"deformer": "pilots"},
         f"{size} numbers: {len(places)} places of the shape that go where they are told",
     )
-    draft.stage["pilot"] = {n: {"measure": "position", "spot": s} | own for n, s in found.items()}
+    draft.stage["pilot"] = {
+        name: {"measure": "position", "spot": {"near": row}} | own
+        for name, row in zip(chosen, rows, strict=True)
+    }
     reach = BOUND * float(np.ptp(np.asarray(geometry.points), axis=0).max())
     for name, one in held.items():
         draft.add(f"move_{name}", {"link": "named", "parameter": name}, one.size, reach, "m")
     return draft
+
+
+def _direction(along: Sequence[float]) -> tuple[float, float, float]:
+    if len(along) != 3:
+        raise ParameterError(f"along is names of axes, or a vector, got {along!r:.40}")
+    x, y, z = map(float, along)
+    return x, y, z
 
 
 def _surface(geometry: Geometry, need: str) -> Surface:

@@ -9,7 +9,7 @@ import bmesh
 import numpy as np
 from mathutils import Vector
 
-from . import edits, view
+from . import edits, project, view
 
 NAMED = {
     "wing_skeleton": ("span", "chord", "sweep", "dihedral", "twist"),
@@ -168,7 +168,10 @@ def _by_selection(context: Any, asked: Any) -> Made:
     mirror = {} if asked.mirrored == "NONE" else {"mirrored": asked.mirrored}
     is_each, axis, normal = asked.moves == "EACH", asked.axis, None
     if axis == "NORMAL":
-        normal = normal_near(context.scene.moldline.surface, places(obj, numbers))
+        surface = project.surface(context.scene)
+        if surface is None:
+            raise edits.Wrong("the surface is not in the scene; use Restore Surface")
+        normal = normal_near(surface, places(obj, numbers))
 
     def make(client: Any, case: Any) -> Found:
         handle = handle_of(case, stage)

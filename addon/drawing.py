@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import edits, insight, legend, measuring, view
+from . import edits, insight, legend, measure_kinds, measuring, project, view
 from .variables import MOST_SLIDERS
 
 PIXELS = 7.5
@@ -79,7 +79,7 @@ def draw_variables(layout: Any, context: Any) -> None:
 def draw_sliders(layout: Any, context: Any) -> None:
     """The active variable's numbers, with what they are bounded by."""
     scene, name = context.scene, view.active_variable(context.scene)
-    surface = scene.moldline.surface
+    surface = project.surface(scene)
     table = edits.variables(view.case_of(scene)).get(name)
     if table is None or surface is None or name not in surface:
         return
@@ -121,8 +121,9 @@ def draw_measures(layout: Any, context: Any) -> None:
     table = edits.measures(view.case_of(scene)).get(name)
     if table is None:
         return
-    kind = str(table.get("measure", "")).replace("_", " ")
-    layout.label(text=f"{name}: {kind}", translate=False)
+    kind = measure_kinds.KINDS.get(table.get("measure", ""))
+    if kind is not None:
+        say(layout, context, kind.told)
     column = layout.column(align=True)
     found = measuring.lines(table, now.numbers.get(name, ()), now.beyond.get(name))
     for said, is_beyond in found[:MOST_SLIDERS]:
@@ -152,8 +153,16 @@ def draw_look(layout: Any, context: Any) -> None:
     if shown.is_coloured and scale is not None:
         said = f"{scale.low:.3g} to {scale.largest:.3g} {scale.unit}"
         say(box, context, f"{scale.title}, {said}", "BLANK1")
+    if shown.is_coloured and shading_of(context) not in ("", "SOLID"):
+        say(box, context, "Solid shading of the view shows the colours", "INFO")
     if shown.is_coloured and insight.trouble(scene):
         say(box, context, insight.trouble(scene), "ERROR")
+
+
+def shading_of(context: Any) -> str:
+    """How the view that the panel belongs to shades things."""
+    space = getattr(context, "space_data", None)
+    return space.shading.type if getattr(space, "type", "") == "VIEW_3D" else ""
 
 
 def draw_health(layout: Any, context: Any) -> None:

@@ -121,7 +121,7 @@ _WHAT = {"normal": "motion outwards", "size": "size of motion"}
 
 
 def _painted(scene: Any, numbers: np.ndarray, title: str, unit: str, how: str) -> None:
-    surface = scene.moldline.surface
+    surface = project.surface(scene)
     if surface is None or not scene.moldline_view.is_coloured or surface.mode == "EDIT":
         return
     if len(numbers) != len(surface.data.vertices):
@@ -159,7 +159,7 @@ class MOLDLINE_OT_show_sensitivity(Operator):
     @classmethod
     def poll(cls, context):
         """Needs a variable and a shape."""
-        if context.scene.moldline.surface is not None and view.active_variable(context.scene):
+        if project.surface(context.scene) is not None and view.active_variable(context.scene):
             return True
         cls.poll_message_set("Needs a case with a variable")
         return False
@@ -184,7 +184,7 @@ class MOLDLINE_OT_hide_sensitivity(Operator):
     def execute(self, context):
         """Take the colours away."""
         context.scene.moldline_view.is_coloured = False
-        surface = context.scene.moldline.surface
+        surface = project.surface(context.scene)
         if surface is not None and surface.mode != "EDIT":
             convert.colour(surface.data, None)
         legend.hide()
@@ -249,13 +249,13 @@ class MOLDLINE_OT_select_faults(Operator):
     @classmethod
     def poll(cls, context):
         """Needs bad faces."""
-        return context.scene.moldline.surface is not None and bool(
+        return project.surface(context.scene) is not None and bool(
             len(_now.health.get(context.scene.name, {}).get("faces", ()))
         )
 
     def execute(self, context):
         """Select them."""
-        surface, faces = context.scene.moldline.surface, health(context.scene)["faces"]
+        surface, faces = project.surface(context.scene), health(context.scene)["faces"]
         if context.object is not None and context.object.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
         for one in context.selected_objects:
@@ -282,7 +282,7 @@ def _shape_key(scene: Any) -> Any:
 
 def _paint_key(scene: Any) -> Any:
     """What colours depend on."""
-    told, surface = scene.moldline, scene.moldline.surface
+    told, surface = scene.moldline, project.surface(scene)
     look = view.active_variable(scene), told.active_number, scene.moldline_view.how
     on = (len(surface.data.vertices), surface.mode) if surface is not None else ()
     return _shape_key(scene), look, on

@@ -109,7 +109,7 @@ class MOLDLINE_UL_measures(UIList):
 
 
 def _components(self: Any, context: Any, typed: str) -> list[str]:
-    surface = context.scene.moldline.surface
+    surface = project.surface(context.scene)
     return convert.components(surface) if surface is not None else []
 
 
@@ -155,7 +155,7 @@ class MOLDLINE_OT_add_measure(Operator):
 
     def invoke(self, context, event):
         """Begin in the middle of the span, and of the chord."""
-        surface, needs = context.scene.moldline.surface, KINDS[self.kind].needs
+        surface, needs = project.surface(context.scene), KINDS[self.kind].needs
         if any(need.lstrip("?") == "at" for need in needs) and surface is not None:
             ends = [(surface.matrix_world @ choosing.Vector(c)).y for c in surface.bound_box]
             self.at = self.at or f"{(min(ends) + max(ends)) / 2:.3g}"
@@ -337,7 +337,7 @@ def _has_case(cls: Any, context: Any) -> bool:
 
 def _asked(context: Any, given: Any) -> Asked:
     """What the operator's fields and the selection say."""
-    surface = context.scene.moldline.surface
+    surface = project.surface(context.scene)
     vertices = choosing.selected(surface) if surface is not None else []
     others = [one for one in context.selected_objects if one is not surface and one.type == "MESH"]
     others = [one for one in others if not getattr(one.moldline, "role", "")]

@@ -5,7 +5,7 @@ from typing import Any
 
 import bpy
 
-from . import choosing, environment, project, session, view
+from . import choosing, environment, project, results, session, view
 from .drawing import (
     button,
     draw_health,
@@ -28,6 +28,11 @@ ADDED = (
     ("add_pilot_points", "Pilot Points", "PIVOT_CURSOR"),
 )
 """Operators that add a stage, with what the panel calls them."""
+
+HINTS = {
+    "MESH": "Tab for edit mode; then select control points, and move them with G",
+    "ARMATURE": "Ctrl Tab for pose mode; then turn, move and scale bones with R, G and S",
+}
 
 ICONS = {
     "no environment": "ERROR",
@@ -69,8 +74,15 @@ def draw_case(layout: Any, context: Any) -> None:
     button(row, "save_case", "Save", "FILE_TICK")
     button(row, "save_case_as", "", "FILE_NEW")
     button(row, "revert_case", "", "LOOP_BACK")
+    button(row, "close_case", "", "X")
     if not project.is_open(context.scene):
         button(layout, "reopen_case", icon="FILE_REFRESH")
+    shown = project.surface(context.scene)
+    if shown is None or shown.get(results.EDITED, False):
+        row = layout.row(align=True)
+        button(row, "restore_surface", icon="LOOP_BACK")
+        if shown is not None:
+            button(row, "use_surface", icon="CHECKMARK")
     layout.label(text=told.path or told.text.name, icon="TEXT", translate=False)
     if told.status:
         say(layout, context, told.status, "ERROR" if told.is_alert else "INFO")
@@ -102,6 +114,9 @@ def draw_parameterise(layout: Any, context: Any) -> None:
     row = layout.row(align=True)
     button(row, "reset_handle", "Reset", "LOOP_BACK")
     button(row, "mirror_handle", "Mirror", "MOD_MIRROR")
+    button(row, "show_handles", "Show", "HIDE_OFF")
+    if active >= 0 and context.object.mode == "OBJECT":
+        say(layout, context, HINTS.get(context.object.type, ""), "INFO")
 
 
 class MOLDLINE_PT_main(bpy.types.Panel):

@@ -6,7 +6,7 @@ from types import ModuleType
 
 MODULES = (
     "preferences", "session", "buttons", "project", "files", "case_files", "handles", "following",
-    "controls", "variables", "insight", "legend", "panels", "translations",
+    "controls", "variables", "insight", "legend", "panels", "menus", "translations",
 )  # fmt: skip
 """In the order in which they are registered."""
 

@@ -107,6 +107,8 @@ def _follow(scene: bpy.types.Scene) -> pursuit.Pursuit | None:
         except (ServerError, session.Problem) as error:
             project.tell(scene, str(session.met(error)), is_alert=True)
             return None
+        if found is not None:
+            project.leave(found.case)
         found = _now[scene.name] = pursuit.Pursuit(case, own)
     return found
 

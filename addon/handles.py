@@ -144,6 +144,14 @@ def write(obj: bpy.types.Object, moved: np.ndarray) -> None:
         obj[WRITTEN] = now.ravel().tolist()
 
 
+def push(obj: bpy.types.Object, moved: np.ndarray) -> int:
+    """Move points as a hand does, so that the shape follows; how many are elsewhere now."""
+    local = _apply(_inverse(placed(obj)), np.asarray(moved, float)).astype(np.float32)
+    before = own(obj)
+    _move(obj, local)
+    return int((before != local).any(axis=1).sum())
+
+
 def own(obj: bpy.types.Object) -> np.ndarray | None:
     """What Blender has: coordinates, (k, 3), or poses against rest, (b, 4, 4); None if others."""
     count = len(obj[FROZEN])

@@ -5,6 +5,7 @@ The text is the truth and lies in the .blend, as does all that this module needs
 only connections are kept outside, by what they are connections to.
 """
 
+import contextlib
 import functools
 import json
 from collections.abc import Callable, Mapping
@@ -14,11 +15,12 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import convert, handles, session
+from . import handles, results, session
+from .client.protocol import ServerError
 
 COLLECTION = "Moldline"
-MOST_OPEN = 4
-"""Cases that stay open: going back and forth between texts by undo then costs nothing."""
+MOST_OPEN = 2
+"""Cases that stay open: going back to the text before by undo then costs nothing."""
 
 _cases: dict[tuple[str, str], tuple[Any, Any]] = {}
 _opening: set[tuple[str, str]] = set()
@@ -153,7 +155,7 @@ def open_case(
         here.folder, here.path, here.surface = folder, path, bpy.data.objects.get(own)
         _build(scene, *found)
 
-    _open(scene, text, folder, opened, then, failed)
+    _open(scene, text, folder, opened, then, failed, keeps=False)
 
 
 def update_text(
@@ -161,11 +163,15 @@ def update_text(
     text: str,
     then: Callable[[], None] | None = None,
     failed: Callable[[str], None] | None = None,
+    place: tuple[str, str] | None = None,
+    keeps: bool = True,
 ) -> None:
-    """Give the scene's case another text; values of variables that stay are kept.
+    """Give the scene's case another text; values of variables that stay are kept, if `keeps`.
 
-    Where the text cannot be opened, the old one stays and the status says why.
+    `place` is another folder and path of the case. Where the text cannot be opened, the old one
+    stays and the status says why.
     """
+    folder, path = place or (scene.moldline.folder, scene.moldline.path)
 
     def opened(scene: bpy.types.Scene, found: tuple) -> None:
         here = scene.moldline
@@ -173,9 +179,12 @@ def update_text(
             here.text = bpy.data.texts.new(here.text.name)  # a copied scene keeps its own
         here.text.clear()
         here.text.write(text)
+        here.folder, here.path = folder, path
+        if path:
+            here.text.name = Path(path).name
         _build(scene, *found)
 
-    _open(scene, text, scene.moldline.folder, opened, then, failed)
+    _open(scene, text, folder, opened, then, failed, keeps)
 
 
 def reopen(scene: bpy.types.Scene, then: Callable[[], None] | None = None) -> None:
@@ -194,6 +203,12 @@ def close_case(scene: bpy.types.Scene) -> None:
                 del here.surface[name]
     for name in ("text", "folder", "path", "surface", "description", "status", "is_alert"):
         here.property_unset(name)
+
+
+def leave(case: Any) -> None:
+    """Close a case on the server, so that its process may serve another."""
+    with contextlib.suppress(ServerError, OSError):
+        case.close()
 
 
 def forget() -> None:
@@ -230,9 +245,10 @@ def _open(
     opened: Callable[[bpy.types.Scene, tuple], None],
     then: Callable[[], None] | None,
     failed: Callable[[str], None] | None,
+    keeps: bool = True,
 ) -> None:
     name, key = scene.name, (folder, text)
-    kept = values(scene)
+    kept = values(scene) if keeps else {}
     _opening.add(key)
     _refused.discard(key)
 
@@ -248,9 +264,10 @@ def _open(
 
     def done(found: tuple) -> None:
         _opening.discard(key)
-        for oldest in list(_cases)[: max(0, len(_cases) - MOST_OPEN + 1)]:
-            del _cases[oldest]
+        _cases.pop(key, None)
         _cases[key] = found[:2]
+        while len(_cases) > MOST_OPEN:
+            leave(_cases.pop(next(iter(_cases)))[1])
         scene = bpy.data.scenes.get(name)
         if scene is None:
             return
@@ -282,7 +299,8 @@ def _build(scene: bpy.types.Scene, case: Any, own: Mapping, shape: Any, nets: li
     here = scene.moldline
     before = set(variables(scene))
     here.description = json.dumps(case.description)
-    shown = _shown(scene, case, shape)
+    title = Path(here.path).stem or str(case.description["result"]) or "Surface"
+    shown = here.surface = results.show(scene, here.surface, case, shape, title)
     for name in before - set(case.variables):
         if name in shown:
             del shown[name]
@@ -291,57 +309,6 @@ def _build(scene: bpy.types.Scene, case: Any, own: Mapping, shape: Any, nets: li
         _declare(shown, name, told)
     handles.rebuild(scene, shown, nets)
     here.active_variable = min(here.active_variable, max(len(case.variables) - 1, 0))
-
-
-def _shown(scene: bpy.types.Scene, case: Any, shape: Any) -> bpy.types.Object:
-    """The object of the result, made where there is none, with the shape's points."""
-    shown = scene.moldline.surface
-    joining = (shape.faces, shape.tags, shape.components)
-    faces, tags, components = case.joining if shape.faces is None else joining
-    if shown is not None and shown.type != "MESH":
-        shown = None
-    if shown is None:
-        title = Path(scene.moldline.path).stem or case.description["result"] or "Surface"
-        lines = _lines(case, len(shape.points)) if faces is None else None
-        shown = convert.new_object(
-            title, shape.points, faces=faces, lines=lines, tags=tags, components=components or ()
-        )
-        scene.moldline.surface = shown
-    elif is_other(shown.data, shape.points, faces):
-        if faces is None:
-            shown.data.clear_geometry()
-            shown.data.from_pydata(shape.points, _lines(case, len(shape.points)), ())
-        else:
-            convert.set_faces(shown, shape.points, faces, tags, components)
-    shown.pop("moldline_joined", None)
-    shown.pop("moldline_edited", None)
-    convert.set_points(shown.data, shape.points)
-    if shown.name not in scene.objects:
-        scene.collection.objects.link(shown)
-    return shown
-
-
-def is_other(mesh: bpy.types.Mesh, points: np.ndarray, faces: np.ndarray | None) -> bool:
-    """Whether a mesh is not made of these points and faces."""
-    if len(mesh.vertices) != len(points):
-        return True
-    if faces is None:
-        return len(mesh.polygons) > 0
-    if len(mesh.polygons) != len(faces) - mesh.get(convert.LEFT_OUT, 0):
-        return True
-    corners = np.empty(len(mesh.loops), np.int32)
-    if len(corners) != faces.size:
-        return faces.shape[1] == 3 and not mesh.get(convert.LEFT_OUT)
-    mesh.attributes[".corner_vert"].data.foreach_get("value", corners)
-    return not np.array_equal(corners, np.ravel(faces))
-
-
-def _lines(case: Any, count: int) -> np.ndarray:
-    """What joins points without faces: those of a section follow each other."""
-    if case.description.get("kind") != "section":
-        return np.zeros((0, 2), np.int32)
-    first = np.arange(count - 1)
-    return np.stack([first, first + 1], axis=1)
 
 
 def _write(shown: bpy.types.Object, name: str, numbers: np.ndarray) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import convert, edits, handles, project
+from . import convert, edits, handles, project, results
 from .client.remote import Handle
 
 REST = 0.15
@@ -40,8 +40,8 @@ class Pursuit:
 
     Attributes
     ----------
-    key
-        The case that the scene had when this began.
+    key, case
+        The case that the scene had when this began, and the same on the connection of drags.
     values
         Those that were asked for last; None to ask again, whatever they are.
     is_resting
@@ -55,7 +55,7 @@ class Pursuit:
         self.values: Values | None = None
         self.is_resting = False
         self.changed_at = 0.0
-        self._case = case
+        self.case = case
         self._coarse, self._fine = case.live(dtype="<f4"), case.live()
         self._joined = {case.connectivity or "": case.joining}
         self._asked: dict[str, bytes] = {}
@@ -92,20 +92,20 @@ class Pursuit:
             return False
         if shown.mode in ("EDIT", "SCULPT"):
             if self._before_edit is None:
-                self._before_edit = convert.floats(shown.data)
+                self._before_edit = _coordinates(shown.data)
             return False
         if self._before_edit is not None:
-            is_same = np.array_equal(self._before_edit, convert.floats(shown.data))
+            is_same = np.array_equal(self._before_edit, _coordinates(shown.data))
             self._before_edit = None
             if not is_same:
-                shown["moldline_edited"] = True
+                shown[results.EDITED] = True
                 project.tell(
                     scene,
                     "the surface was edited by hand: 'Use Edited Surface' makes it the geometry, "
                     "'Restore Surface' brings the result back",
                     is_alert=True,
                 )
-        return not shown.get("moldline_edited", False)
+        return not shown.get(results.EDITED, False)
 
     def ask(self, scene: bpy.types.Scene) -> None:
         """Send what has changed: a handle that was moved, else values."""
@@ -168,10 +168,10 @@ class Pursuit:
         if shape.faces is not None:
             self._joined[name] = shape.faces, shape.tags, shape.components
         shown, joined = project.surface(scene), self._joined.get(name)
-        if joined is not None and shown.get("moldline_joined") != name:
-            if joined[0] is not None and project.is_other(shown.data, shape.points, joined[0]):
+        if joined is not None and shown.get(results.JOINED) != name:
+            if joined[0] is not None and results.is_other(shown.data, shape.points, joined[0]):
                 convert.set_faces(shown, shape.points, *joined)
-            shown["moldline_joined"] = name
+            shown[results.JOINED] = name
         if len(shown.data.vertices) == len(shape.points):
             convert.set_points(shown.data, shape.points)
         for tell in listeners:
@@ -181,14 +181,14 @@ class Pursuit:
         """Ask where values have the handles, unless that is being asked already."""
         if self._nets is None and self.values is not None:
             listed = {name: one.tolist() for name, one in self.values.items()}
-            self._nets = self._case.send("handles", values=listed), self.values
+            self._nets = self.case.send("handles", values=listed), self.values
             self._nets_at = time.monotonic()
 
     def _answered(self) -> Any:
         """Where the handles are, if that has come."""
         if self._nets is None:
             return None
-        told = self._case.taken(self._nets[0])
+        told = self.case.taken(self._nets[0])
         if told is not None:
             self._nets_of, self._nets = self._nets[1], None
         return told
@@ -235,6 +235,13 @@ class Pursuit:
 def mark_of(obj: bpy.types.Object) -> bytes:
     """Where Blender has a handle."""
     return handles.own(obj).tobytes() + handles.placed(obj).tobytes()
+
+
+def _coordinates(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Of a mesh as it is outside edit mode, also while it is in it."""
+    found = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", found)
+    return found
 
 
 def same(one: Values, other: Values) -> bool:

@@ -8,33 +8,40 @@ import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.moldline import convert, following, handles, project, session
+from bl_ext.user_default.moldline.client.client import Client
 from mathutils import Vector
+
+LINK = '[[stage.link]]\nvariable = "lift"\nlink = "camber"\nalong = "x"\naxis = "z"\n'
+
+
+def opened(path, text):
+    """The scene with a case of that text, up to date."""
+    found = bpy.context.scene
+    project.open_case(found, text, str(path.parent), str(path))
+    assert project.is_open(found), found.moldline.status
+    following.settle()
+    assert not following.is_busy(found), found.moldline.status
+    return found
 
 
 @pytest.fixture
 def scene(ball_case):
     """A scene with the ball's case, its handle free to move along z by two numbers."""
-    found = bpy.context.scene
-    project.open_case(found, ball_case.read_text(), str(ball_case.parent), str(ball_case))
-    following.settle()
-    return found
+    return opened(ball_case, ball_case.read_text())
 
 
 @pytest.fixture
-def free(scene, tmp_path):
-    """The same with a number for each control point and direction, without bounds."""
-    text = project.text(scene).replace("bounds = [-1.0, 1.0]", "").replace("size = 2", "size = 12")
-    links = "".join(
-        f'\n[[stage.link]]\nvariable = "{n}"\nlink = "each"\naxis = "{axis}"\n'
-        for n, axis in (("lift", "z"), ("push", "x"))
+def free(ball_case):
+    """The same with a number for each control point along z and along x, without bounds."""
+    text = (
+        ball_case.read_text().replace("bounds = [-1.0, 1.0]\n", "").replace("size = 2", "size = 12")
     )
-    text = text.replace(
-        '[[stage.link]]\nvariable = "lift"\nlink = "camber"\nalong = "x"\naxis = "z"\n', links
-    ).replace("[[stage]]", '[variable.push]\nsize = 12\nunit = "m"\n\n[[stage]]', 1)
-    project.update_text(scene, text)
-    assert project.text(scene) == text, scene.moldline.status
-    following.settle()
-    return scene
+    links = "".join(
+        f'[[stage.link]]\nvariable = "{name}"\nlink = "each"\naxis = "{axis}"\n\n'
+        for name, axis in (("lift", "z"), ("push", "x"))
+    )
+    push = '[variable.push]\nsize = 12\nunit = "m"\n\n[[stage]]'
+    return opened(ball_case, text.replace(LINK, links).replace("[[stage]]", push, 1))
 
 
 def shape(scene):
@@ -62,7 +69,7 @@ def test_a_slider_moves_the_shape_in_double_precision(scene):
     surface["lift"][1] = 0.25
     following.settle()
     np.testing.assert_array_equal(shape(scene), wanted(scene))
-    assert np.ptp(shape(scene)[:, 2]) > 2.01
+    assert np.ptp(shape(scene)[:, 2]) > 2.001
     net = handles.of_stage(scene, 0)
     np.testing.assert_array_equal(
         handles.read(net), project.case(scene).handles({"lift": [0, 0.25]})[0].moved
@@ -193,8 +200,9 @@ def test_a_server_that_dies_in_a_drag_loses_nothing(free):
     surface = project.surface(free)
     project.set_values(free, {"lift": [0.1] * 12})
     following.step(free)
-    pid = session.client().cases()[0]["pid"]
-    os.kill(pid, signal.SIGKILL)
+    for case in session.client().cases():
+        if case["pid"]:
+            os.kill(case["pid"], signal.SIGKILL)
     project.set_values(free, {"lift": [0.2] * 12})
     following.settle()
     np.testing.assert_array_equal(shape(free), wanted(free))
@@ -202,7 +210,7 @@ def test_a_server_that_dies_in_a_drag_loses_nothing(free):
 
 
 def test_moldline_that_was_stopped_is_started_again(free):
-    session.client().shutdown()
+    Client(session.client().address, shared=False).shutdown()
     handles.of_stage(free, 0).data.vertices[3].co.z += 0.5
     following.settle()
     assert project.values(free)["lift"][3] == pytest.approx(0.5, abs=1e-6)

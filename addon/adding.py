@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How something that moves a shape is added: to the scene's case, or as a case of an object."""
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import bmesh
+import bpy
+import numpy as np
+
+from . import (
+    amending,
+    case_files,
+    choosing,
+    convert,
+    files,
+    handles,
+    project,
+    session,
+    stages,
+    view,
+)
+
+
+class Geometry(NamedTuple):
+    """What a new case is about: a file, or what has to be written to one first."""
+
+    name: str
+    file: str
+    units: str
+    given: Any = None
+
+
+def add(operator: Any, context: Any, kind: str, bounded: bool, options: dict[str, Any]) -> set[str]:
+    """Add a stage of a kind: to the scene's case where that is selected, else as a new case."""
+    scene, obj = context.scene, context.object
+    problems: list[str] = []
+    stages.to_object_mode(context)
+    is_new = not project.has_case(scene) or not belongs(scene, obj)
+    try:
+        target = _geometry(obj) if is_new else None
+    except session.Problem as problem:
+        return amending.finished(operator, [str(problem)])
+    text = "" if is_new else project.text(scene)
+    folder = case_files.new_folder() if is_new else scene.moldline.folder
+    title, own = scene.name, obj.name if obj is not None else ""
+    chosen = {"on": options.pop("on")} if options.get("on") else {}
+
+    def work(client: Any) -> dict[str, Any]:
+        if target is None:
+            return client.draft(text, folder, kind, bounded=bounded, **chosen, **options)
+        where = {"geometry": _written(client, folder, target)}
+        where |= {"units": target.units} if target.units else {}
+        return client.draft("", folder, kind, bounded=bounded, **where, **options)
+
+    def drafted(told: dict[str, Any]) -> None:
+        found = bpy.data.scenes[title]
+
+        def then() -> None:
+            _added(title, told["stage"], told["variables"], told["why"])
+
+        if target is None:
+            _shift(found, told["stage"])
+            project.update_text(found, told["text"], then, problems.append)
+        else:
+            onto = bpy.data.objects.get(own)
+            project.open_case(found, told["text"], folder, "", then, onto, problems.append)
+
+    session.run(work, drafted, lambda p: problems.append(str(p)), what=f"adding a {kind}")
+    return amending.finished(operator, problems)
+
+
+def belongs(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bool:
+    """Whether an object is a part of the scene's case: its surface, a handle, or nothing at all."""
+    return obj is None or obj == scene.moldline.surface or bool(obj.moldline.role)
+
+
+def selection(obj: bpy.types.Object) -> np.ndarray:
+    """Where the selected points of a mesh are, (k, 3), in its own coordinates."""
+    if obj.mode == "EDIT":
+        own = bmesh.from_edit_mesh(obj.data)
+        return np.array([v.co[:] for v in own.verts if v.select]).reshape(-1, 3)
+    return convert.points(obj.data)[choosing.selected(obj)]
+
+
+def region(obj: bpy.types.Object) -> list[list[float]]:
+    """Two corners around the selected points, a little larger."""
+    chosen = selection(obj)
+    if len(chosen) < 2:
+        raise session.Problem("select some points in edit mode first", "parameter")
+    low, high = chosen.min(axis=0), chosen.max(axis=0)
+    room = 1e-3 * max(float((high - low).max()), 1e-9)
+    return [(low - room).tolist(), (high + room).tolist()]
+
+
+def component(obj: bpy.types.Object) -> str:
+    """The component of the active material slot."""
+    names = convert.components(obj)
+    slot = min(obj.active_material_index, len(names) - 1)
+    material = obj.active_material
+    told = material.get(convert.NAMES) if material is not None else None
+    return told if told in names else names[slot]
+
+
+def around_what(obj: bpy.types.Object | None, around: str) -> dict[str, Any]:
+    """Options that say which part is meant."""
+    if around == "ALL":
+        return {}
+    if obj is None or obj.type != "MESH" or obj.moldline.role:
+        raise session.Problem("make the surface the active object first", "parameter")
+    if around == "COMPONENT":
+        return {"component": component(obj)}
+    return {"region": region(obj)}
+
+
+def _geometry(obj: bpy.types.Object | None) -> Geometry:
+    """The geometry that a mesh object is."""
+    if obj is None or obj.type != "MESH" or obj.moldline.role:
+        raise session.Problem("select a mesh object; it becomes the case's geometry", "geometry")
+    known = files.source(obj)
+    if known is not None:
+        return Geometry(obj.name, known[0], known[1])
+    ending = ".vtp"
+    if files.SHAPES in obj.data:
+        ending = ".xyz"
+    elif not len(obj.data.polygons):
+        ending = ".dat"
+    name = "".join(c if c.isalnum() else "_" for c in obj.name).strip("_") or "geometry"
+    return Geometry(name + ending, "", "", files.geometry([obj], ending))
+
+
+def _written(client: Any, folder: str, target: Geometry) -> str:
+    """The geometry's file, written where there is none."""
+    if target.file:
+        return target.file
+    own = target.given
+    client.write(
+        Path(folder) / target.name,
+        own.points,
+        own.faces,
+        own.tags,
+        own.components,
+        own.data,
+        **own.options,
+    )
+    return target.name
+
+
+def _shift(scene: bpy.types.Scene, stage: int) -> None:
+    """Handles of stages behind a new one keep their objects."""
+    for obj in handles.all_of(scene):
+        if obj.moldline.stage >= stage:
+            obj.moldline.stage += 1
+
+
+def _added(title: str, stage: int, variables: list[str], why: str) -> None:
+    """Show what was added, and take hold of it."""
+    scene = bpy.data.scenes[title]
+    view.sync(scene)
+    if variables:
+        view.choose(scene, variables[0])
+    scene.moldline.active_stage = stage
+    obj = handles.of_stage(scene, stage)
+    if obj is not None and bpy.context.scene == scene:
+        stages.take(bpy.context, obj)
+    project.tell(scene, why)
+    view.redraw()

@@ -16,7 +16,7 @@ from bl_ext.user_default.moldline import (
     view,
 )
 
-BLENDERS = {"ending", "filepath", "check_existing", "files", "directory"}
+BLENDERS = {"filepath", "check_existing", "files", "directory"}
 CONTAINERS = {"row", "column", "box", "split", "grid_flow", "column_flow"}
 
 
@@ -154,8 +154,8 @@ def test_every_operator_and_property_has_a_tooltip():
         assert told.description and not told.description.endswith("."), told.identifier
         for name, held in told.properties.items():
             if name != "rna_type" and not held.is_hidden:
-                is_blenders = name.startswith("filter_") or name in BLENDERS
-                assert held.description or is_blenders, f"{told.identifier}.{name}"
+                is_plain = held.type == "ENUM" or name.startswith("filter_") or name in BLENDERS
+                assert held.description or is_plain, f"{told.identifier}.{name}"
 
 
 def test_what_is_shown_can_be_translated():

@@ -47,7 +47,12 @@ def _in_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu("MOLDLINE_MT_case")
 
 
-PLACES = {"VIEW3D_MT_add": _in_add, "VIEW3D_MT_object": _in_object}
+PLACES = {
+    "VIEW3D_MT_add": _in_add,
+    "VIEW3D_MT_object": _in_object,
+    "VIEW3D_MT_pose": _in_object,
+    "VIEW3D_MT_edit_mesh": _in_object,
+}
 
 
 def register() -> None:

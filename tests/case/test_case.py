@@ -142,3 +142,17 @@ def test_the_schema_is_the_one_in_the_docs():
     assert json.loads(path.read_text()) == json.loads(json.dumps(json_schema())), (
         "run: moldline schema -o docs/case.schema.json"
     )
+
+
+def test_a_case_that_is_saved_keeps_its_comments(folder):
+    text = TEXT.replace("size = 3", "size = 3  # stations").replace(
+        "[[stage]]", "# a box\n[[stage]]"
+    )
+    case = ml.load(written(folder, text))
+    case.save(folder / "same.toml")
+    assert (folder / "same.toml").read_text() == text
+    case.save(folder / "other.toml", {"t": [0.1, 0.2, 0.3]})
+    found = (folder / "other.toml").read_text()
+    assert found.replace("value = [0.1, 0.2, 0.3]\n", "") == text
+    case.save(folder / "rest.toml", {"t": [0.0, 0.0, 0.0]})
+    assert (folder / "rest.toml").read_text() == text

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from .. import registry
 from .._types import Points
@@ -28,7 +27,7 @@ from ..pipeline.construction import Construction
 from ..pipeline.measurements import Maker, Measurements
 from ..pipeline.pipeline import Pipeline
 from ..pipeline.stage import Stage
-from . import built, options, schema
+from . import built, editing, options, schema
 from .options import MeasureTable
 
 
@@ -48,6 +47,8 @@ class Case:
         Pipelines of the points that ride on a geometry, by name.
     measurements
         Measures of the resulting geometry, with their bounds.
+    text
+        Of the file.
     """
 
     path: Path
@@ -55,6 +56,7 @@ class Case:
     pipeline: Pipeline
     riders: dict[str, Pipeline]
     measurements: Measurements
+    text: str = ""
 
     def units(self, rider: str | None = None) -> str | None:
         """The unit of the resulting geometry's file, or of a rider's."""
@@ -96,11 +98,16 @@ class Case:
         return None if place is None else self.path.parent / place
 
     def save(self, path: str | os.PathLike[str], values: Mapping[str, Any] | None = None) -> None:
-        """Write the case file, with new values where given; it then reads back as this case."""
+        """Write the case file, with new values where given; it then reads back as this case.
+
+        Comments and order stay.
+        """
         tables = self.tables.model_dump(exclude_unset=True)
         for name, value in (values or {}).items():
-            checked = self.pipeline.variables[name].checked(np.asarray(value, float))
-            tables["variable"][name]["value"] = np.asarray(checked).tolist()
+            variable = self.pipeline.variables[name]
+            checked = np.asarray(variable.checked(np.asarray(value, float)))
+            if not np.array_equal(checked, variable.value):
+                tables["variable"][name]["value"] = checked.tolist()
         target = Path(path)
         if target.parent.resolve() != self.path.parent.resolve():
             for table in (*tables.get("geometry", {}).values(), *tables.get("rider", {}).values()):
@@ -109,7 +116,7 @@ class Case:
                 if kind in tables:
                     tables[kind] = built.relocated(tables[kind], self.path.parent)
         with replacing(target) as stream:
-            stream.write(tomli_w.dumps(_without_none(tables)).encode())
+            stream.write(editing.rewritten(self.text, _without_none(tables)).encode())
 
 
 def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
@@ -120,7 +127,8 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
     """
     place = Path(path)
     file = str(place)
-    tables = schema.parse(schema.text_of(place), file)
+    text = schema.text_of(place)
+    tables = schema.parse(text, file)
     geometries = {
         name: _read(place, table, f"geometry.{name}", sampled)
         for name, table in tables.geometry.items()
@@ -145,7 +153,8 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
             name: pipeline.embed(_read(place, table, f"rider.{name}", sampled), table.on, name)
             for name, table in tables.rider.items()
         }
-    return Case(place, tables, pipeline, riders, _measurements(file, tables, pipeline, sampled))
+    measurements = _measurements(file, tables, pipeline, sampled)
+    return Case(place, tables, pipeline, riders, measurements, text)
 
 
 def of_text(text: str, folder: Path) -> Case:
@@ -300,7 +309,9 @@ def _link(
 
 
 def _without_none(table: Any) -> Any:
-    """TOML has no null: such keys are left out."""
+    """TOML has no null: such keys are left out. Tuples are lists."""
     if isinstance(table, dict):
         return {k: _without_none(v) for k, v in table.items() if v is not None}
+    if isinstance(table, list | tuple):
+        return [_without_none(one) for one in table]
     return table

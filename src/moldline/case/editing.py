@@ -4,7 +4,8 @@ import copy
 import math
 import re
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import tomli_w
@@ -22,7 +23,10 @@ VERBS = ("set", "remove", "append", "insert")
 MOST = 1000
 """Edits at a time."""
 
-_HEADER = re.compile(r"\[.*\]\s*(#.*)?")
+_HEADER = re.compile(r"(\s*\[.*\])\s*(#.*)?")
+
+_MARK = "#@"
+"""Before the number of a block of comments, in a text that has none."""
 
 
 def amended(text: str, edits: Sequence[Any]) -> str:
@@ -43,19 +47,48 @@ def amended(text: str, edits: Sequence[Any]) -> str:
     return found
 
 
+def rewritten(text: str, tables: dict[str, Any]) -> str:
+    """A text that says what tables do; where it says that already it stays as it is."""
+    try:
+        before = tomllib.loads(text)
+    except ValueError:
+        return tomli_w.dumps(tables)
+    return _styled(text, list(_differences(before, tables, [])), tables)
+
+
+def _differences(old: Any, new: Any, path: list[str | int]) -> Iterator[dict[str, Any]]:
+    """Edits that make tables of others."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        for key in [key for key in old if key not in new]:
+            yield {"remove": [*path, key]}
+        for key, one in new.items():
+            if key not in old:
+                yield {"set": [*path, key], "to": one}
+            else:
+                yield from _differences(old[key], one, [*path, key])
+    elif _is_tables(old) and _is_tables(new) and len(old) == len(new):
+        for i, (one, other) in enumerate(zip(old, new, strict=True)):
+            yield from _differences(one, other, [*path, i])
+    elif old != new:
+        yield {"set": path, "to": new}
+
+
 def _styled(text: str, edits: Sequence[Any], wanted: dict[str, Any]) -> str:
     """The edits made in the text as it is written; written anew where that cannot be."""
+    if not edits:
+        return text
     try:
-        document = tomlkit.parse(text)
+        masked, blocks = _masked(text)
+        document = tomlkit.parse(masked)
         for edit in edits:
             _edit(document, edit, "", _item)
-        found = tomlkit.dumps(document)
+        found = _unmasked(tomlkit.dumps(document), blocks)
         is_right = tomllib.loads(found) == wanted
-    except (TOMLKitError, TypeError, ValueError, KeyError, AttributeError):
+    except (TOMLKitError, ParameterError, TypeError, ValueError, KeyError, AttributeError):
         is_right = False
     if not is_right:  # tables in an order that the library cannot edit
         return tomli_w.dumps(wanted)
-    spaced = _spaced(found)
+    spaced = _spaced(found, text)
     return spaced if tomllib.loads(spaced) == wanted else found
 
 
@@ -187,12 +220,41 @@ def _is_tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
 
 
-def _spaced(text: str) -> str:
-    """An empty line before each header that has none."""
-    lines: list[str] = []
+def _masked(text: str) -> tuple[str, list[list[str]]]:
+    """Comments above a header put behind it, since the library takes them for the table before."""
+    lines, blocks, waiting = list[str](), list[list[str]](), list[str]()
+    for line in text.split("\n"):
+        if not line.strip() or line.strip().startswith("#"):
+            waiting.append(line)
+            continue
+        header = _HEADER.fullmatch(line)
+        if header is None or not waiting:
+            lines += [*waiting, line]
+        else:
+            lines.append(f"{header[1]} {_MARK}{len(blocks)}")
+            blocks.append([*waiting, line])
+        waiting = []
+    masked = "\n".join([*lines, *waiting])
+    is_same = _MARK not in text and tomllib.loads(masked) == tomllib.loads(text)
+    return (masked, blocks) if is_same else (text, [])
+
+
+def _unmasked(text: str, blocks: list[list[str]]) -> str:
+    lines = []
+    for line in text.split("\n"):
+        _, mark, number = line.rpartition(_MARK)
+        lines += blocks[int(number)] if mark and blocks else [line]
+    return "\n".join(lines)
+
+
+def _spaced(text: str, before: str) -> str:
+    """An empty line before each new header."""
+    old, lines = before.splitlines(), list[str]()
+    known = set(pairwise(old))
     for line in text.splitlines():
         above = lines[-1].strip() if lines else ""
-        if _HEADER.fullmatch(line) and above and not above.startswith("#"):
+        is_new = not lines or (lines[-1], line) not in known
+        if is_new and _HEADER.fullmatch(line) and above and not above.startswith("#"):
             lines.append("")
         lines.append(line)
     return "\n".join(lines).rstrip("\n") + "\n"

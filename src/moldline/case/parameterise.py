@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import registry
 from ..deformers.posed import AbstractPosed
-from ..errors import GeometryError, ParameterError
+from ..errors import GeometryError, MoldlineError, ParameterError
 from ..measures.position import Position
 from ..mesh import Geometry, Section, Surface
 from ..mesh.enclosure import part_of
@@ -92,6 +92,8 @@ def made(kind: str, geometry: Geometry, options: Mapping[str, Any]) -> Draft:
         raise ParameterError(f"no kind {kind!r}; there is: {', '.join(KINDS)}")
     try:
         return KINDS[kind](geometry, **{k: v for k, v in options.items() if v is not None})
+    except MoldlineError:
+        raise
     except (TypeError, ValueError) as error:
         wrong = re.search(r"unexpected keyword argument '(\w+)'", str(error))
         if wrong is not None:
@@ -158,11 +160,12 @@ def lattice(
         + ("as asked for" if shape else f"{ALONG} along the longest side, as dense along others")
         + "; each acts on about two spacings to each side of it",
     )
+    free = int(np.sum(~np.asarray(made.over(geometry, counts, **options).frozen)))
     for axis, length, count in zip("xyz", lengths, counts, strict=True):
         if count > 1:
             link = {"link": "each", "axis": axis} | mirror
             step = BOUND * length / (count - 1)
-            draft.add(f"move_{axis}", link, math.prod(counts), step, "m")
+            draft.add(f"move_{axis}", link, free, step, "m")
     return draft
 
 

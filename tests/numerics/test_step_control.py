@@ -57,6 +57,22 @@ def test_the_derivative_is_as_right_as_is_told(function, promised):
     assert found.error <= 200 * worst
 
 
+def test_noise_is_no_less_than_whoever_rounds_says():
+    still = np.float32(1 / 3) * np.ones(55)  # nothing moves along the first line, so none is seen
+    lines = [Line("still", None, 0.1), Line("t", None, 0.1)]
+
+    def evaluate(probes):
+        return [
+            still + (curve(0.2 + offset) - curve(0.2)).astype(np.float32) * (line.name == "t")
+            for line, offset in probes
+        ]
+
+    control = StepControl(least=1e-7)
+    _, found = control.slopes(evaluate, still, lines)
+    assert control.noise == 1e-7
+    assert np.abs(found.column - slope(0.2)).max() <= 2 * found.error <= 2e-3
+
+
 def test_later_derivatives_take_two_evaluations():
     control, counted = StepControl(), []
     line = Line("t", None, 0.1)

@@ -5,10 +5,11 @@ from pathlib import Path
 
 from . import show
 
-HELP = "Make an environment with Blender, or tell what can be turned in a Blender file."
+HELP = "Make an environment with Blender, and tell what can be turned in a Blender file."
 EXAMPLE = """\
   moldline blender make
-  moldline blender list scene.blend --object wing"""
+  moldline blender list scene.blend --object wing
+  $(moldline blender where) script.py                     (runs a script that imports bpy)"""
 
 
 def configure(command: argparse.ArgumentParser) -> None:
@@ -21,6 +22,7 @@ def configure(command: argparse.ArgumentParser) -> None:
     make.add_argument(
         "--folder", type=Path, help="where; else in this user's cache, where it is found again"
     )
+    actions.add_parser("where", help="tell which Blender is run, or which Python that has bpy")
     found = actions.add_parser("list", help="tell what can be turned in a .blend file")
     found.add_argument("file", type=Path, help=".blend file")
     found.add_argument("--object", help="of this object only")
@@ -32,7 +34,7 @@ def configure(command: argparse.ArgumentParser) -> None:
 
 def run(given: argparse.Namespace) -> int:
     """Do it."""
-    return _make(given) if given.action == "make" else _list(given)
+    return {"make": _make, "where": _where, "list": _list}[given.action](given)
 
 
 def _make(given: argparse.Namespace) -> int:
@@ -43,6 +45,13 @@ def _make(given: argparse.Namespace) -> int:
     print(f"Blender {given.release} is in {python.parent.parent}")
     if given.folder is not None:
         print(f"it is found with {VARIABLE}={python}, or with python = {str(python)!r} in a stage")
+    return 0
+
+
+def _where(given: argparse.Namespace) -> int:
+    from ..modelers.blender_found import found_interpreter
+
+    print(found_interpreter())
     return 0
 
 

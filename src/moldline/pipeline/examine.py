@@ -13,6 +13,7 @@ from ..deformers.net import AbstractControlNet
 from ..mesh import Geometry, Surface, VolumeMesh, quality, topology
 from ..mesh.cap import capped
 from ..mesh.joined import joined_points
+from ..modelers.program_making import ProgramMaking
 from ..modelers.union import Union
 from ..numerics import taylor
 from ..numerics.taylor import Remainder, remainder
@@ -20,6 +21,9 @@ from .pipeline import Pipeline, Values
 
 MOST_SAMPLES = 200_000
 """Places in the box of a lattice or control volume that are searched for folds."""
+
+CLEAR = 30.0
+"""Times what programs say of their differences, a remainder has an order that can be seen."""
 
 SHORTEST = 1e-8
 """Part of a typical change below which a union is not looked for that stays as it is."""
@@ -113,17 +117,20 @@ class Proof:
     mismatch
         Relative difference of forward and reverse derivatives, <w, J d> against <J'w, d>.
     method
-        "exact", or what stages written in NumPy fall back to.
+        "exact", or what stages written in NumPy and other programs fall back to.
+    accuracy
+        About how wrong differences are that are taken, relative.
     """
 
     forward: Remainder
     mismatch: float
     method: str
+    accuracy: float = 0.0
 
     @property
     def is_right(self) -> bool:
         """Whether both derivatives are proved."""
-        return self.forward.is_right and self.mismatch < 1e-6
+        return self.forward.is_right and self.mismatch < max(1e-6, self.accuracy)
 
 
 def at_rest(pipeline: Pipeline, values: Values | None = None) -> tuple[Geometry, str | None]:
@@ -255,11 +262,27 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
     pulled = pipeline.pullback(full, weights)
     dotted = float(sum(np.vdot(pulled[name], along[name]) for name in along))
     scale = max(abs(pushed), abs(dotted), 1e-300)
+    told = _told(pipeline)
+    if told > 0:
+        methods.add("differences of programs")
     return Proof(
-        remainder(pipeline.points, full, along, accuracy),
+        remainder(pipeline.points, full, along, max(accuracy, CLEAR * told)),
         abs(pushed - dotted) / scale,
         ", ".join(sorted(methods)) or "exact",
+        told,
     )
+
+
+def _told(pipeline: Pipeline) -> float:
+    """How wrong, relative to a derivative, programs say that their differences are; the worst."""
+    worst = 0.0
+    for name in pipeline.feeding:
+        making = pipeline.branches[name].making
+        for slope in making.accuracy.values() if isinstance(making, ProgramMaking) else ():
+            size = float(np.linalg.norm(slope.column))
+            if size > 0 and np.isfinite(slope.error):
+                worst = max(worst, slope.error * np.sqrt(slope.column.size) / size)
+    return float(worst)
 
 
 def _parts(pipeline: Pipeline, values: Values | None) -> list[Pipeline]:

@@ -83,7 +83,9 @@ def largest_motion(pipeline: Pipeline, values: Values | None = None) -> float:
     here, farthest = pipeline.at(values), 0.0
     for name in here.feeding:
         part = here.of(name)
-        start = part.source(values) if part.branches[part.leading].of else part.geometry.points
+        branch = part.branches[part.leading]
+        is_anew = bool(branch.of) and not (branch.making and branch.making.is_foreign)
+        start = part.source(values) if is_anew else part.geometry.points
         motion = np.asarray(part.points(values)) - np.asarray(start)
         farthest = max(farthest, float(np.linalg.norm(motion, axis=1).max(initial=0.0)))
     return farthest

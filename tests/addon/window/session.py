@@ -4,11 +4,15 @@
 """
 
 import sys
+import time
 from collections.abc import Iterator
+from math import radians
 from pathlib import Path
 
 import addon_utils
 import bpy
+import numpy as np
+from mathutils import Euler, Vector
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -43,15 +47,36 @@ def chosen(hand: Hand, path: Path) -> Iterator[float]:
     yield 0.5
 
 
-def shown(hand: Hand) -> Iterator[float]:
-    """All of the scene in the view, from above and behind."""
-    yield from hand.centre()
-    yield from hand.key("HOME")
-    yield 0.3
+def seen_from(hand: Hand, tilt: float, turn: float, place: tuple, distance: float) -> None:
+    """Where the view is taken from: angles in degrees, what is in its middle, how far away."""
+    view = hand.area.spaces.active.region_3d
+    view.view_perspective = "PERSP"
+    view.view_rotation = Euler((radians(tilt), 0, radians(turn))).to_quaternion()
+    view.view_location, view.view_distance = place, distance
 
 
-def session(hand: Hand) -> Iterator[float]:
-    """All of it."""
+def surface() -> np.ndarray:
+    """The points that the window shows."""
+    mesh = bpy.data.objects["transport_wing"].data
+    found = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.attributes["position"].data.foreach_get("vector", found.reshape(-1))
+    return found
+
+
+def rests() -> bool:
+    """Whether the shape is what handles and values say."""
+    return not sys.modules[f"{MODULE}.following"].is_busy(bpy.context.scene)
+
+
+def tip() -> Vector:
+    """The middle of the outermost bone."""
+    thing = bpy.data.objects["wingskeleton"]
+    bone = thing.pose.bones[-1]
+    return thing.matrix_world @ ((bone.head + bone.tail) / 2)
+
+
+def imported(hand: Hand) -> Iterator[float]:
+    """A geometry through the file browser."""
     yield from hand.centre()
     yield from hand.key("N")
     yield 1.0
@@ -61,11 +86,75 @@ def session(hand: Hand) -> Iterator[float]:
     yield from hand.search("Import Geometry")
     yield from chosen(hand, SURFACE)
     yield from hand.until(lambda: "transport_wing" in bpy.data.objects, 90)
-    yield from shown(hand)
+    seen_from(hand, 55, -60, (18, 8, 0), 58)
     yield from hand.picture("imported")
-    yield from hand.search("Wing Skeleton")
-    yield 8.0
+
+
+def posed(hand: Hand) -> Iterator[float]:
+    """A wing skeleton; its tip is dragged up and turned, undone and done again."""
+    yield from hand.search("Add Wing Skeleton")
+    yield from hand.until(lambda: "wingskeleton" in bpy.data.objects, 120)
+    yield from hand.until(rests)
     yield from hand.picture("skeleton")
+    yield from hand.centre()
+    yield from hand.key("TAB", ctrl=True)
+    yield 0.5
+    rest = surface()
+    yield from hand.click(*hand.place_of(tip()))
+    yield from dragged(hand, "G", 0, 90)
+    lifted = surface()
+    assert np.abs(lifted - rest)[:, 2].max() > 1, "the surface did not follow the hand"
+    yield from hand.picture("dragged")
+    yield from hand.centre()
+    yield from hand.key("Z", ctrl=True)
+    yield 0.3
+    yield from hand.until(rests)
+    assert np.array_equal(surface(), rest), "undo does not bring the surface back"
+    yield from hand.key("Z", ctrl=True, shift=True)
+    yield 0.3
+    yield from hand.until(rests)
+    assert np.array_equal(surface(), lifted), "redo does not bring the shape back"
+    yield from hand.picture("redone")
+
+
+def dragged(hand: Hand, key: str, dx: float, dy: float) -> Iterator[float]:
+    """A tool of Blender's with the mouse: begin, glide, confirm; how often the shape followed."""
+    shapes: list[float] = []
+    following = sys.modules[f"{MODULE}.following"]
+    following.on_shape(note := lambda *_: shapes.append(time.monotonic()))
+    x, y = hand.place_of(tip())
+    yield from hand.move(x, y)
+    yield from hand.key(key)
+    yield from hand.glide(x + dx, y + dy, 60, 0.01)
+    yield from hand.key("RET")
+    sys.modules[f"{MODULE}.pursuit"].listeners.remove(note)
+    print(f"{len(shapes)} shapes in {shapes[-1] - shapes[0]:.2f} s")
+    yield from hand.until(rests)
+
+
+def saved(hand: Hand) -> Iterator[float]:
+    """The case into a file, and what the window shows beside it."""
+    yield from hand.search("Save Case As")
+    yield from chosen(hand, FOLDER / "case.toml")
+    yield from hand.until(lambda: (FOLDER / "case.toml").exists())
+    np.save(FOLDER / "shown.npy", surface())
+
+
+def coloured(hand: Hand) -> Iterator[float]:
+    """The sensitivity to the first number of twist, as colours."""
+    yield from hand.search("Show Sensitivity")
+    yield 3.0
+    yield from hand.picture("sensitivity")
+    yield from hand.search("Hide Sensitivity")
+    yield from hand.search("Check Health")
+    yield 3.0
+    yield from hand.picture("health")
+
+
+def session(hand: Hand) -> Iterator[float]:
+    """All of it."""
+    for part in (imported, posed, saved, coloured):
+        yield from part(hand)
 
 
 prepared()

@@ -44,8 +44,7 @@ def amend(
             then(own)
         view.looked(own)
         view.redraw()
-        if not bpy.app.background:
-            window.push_undo(what)
+        _push_undo(what)
 
     def taken(new: str) -> None:
         project.update_text(bpy.data.scenes[name], new, then=done, failed=problems.append)
@@ -57,6 +56,22 @@ def amend(
 
     session.run(work, then=taken, failed=failed, what=what)
     return finished(operator, problems)
+
+
+def _push_undo(what: str) -> None:
+    """Make an undo step, out of edit mode for a moment: steps made there hold the mesh alone."""
+    windows = [] if bpy.app.background else bpy.context.window_manager.windows
+    if not windows:
+        return
+    with bpy.context.temp_override(window=windows[0]):
+        active = bpy.context.view_layer.objects.active
+        is_edited = active is not None and active.mode == "EDIT"
+        if is_edited:
+            bpy.ops.object.mode_set(mode="OBJECT")
+        window.push_undo(what)
+        if is_edited:
+            bpy.ops.object.mode_set(mode="EDIT")
+            window.push_undo("Edit Mode")
 
 
 def finished(operator: Any, problems: list[str]) -> set[str]:

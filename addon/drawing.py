@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import edits, insight, legend, measure_kinds, measuring, project, view
+from . import choosing, edits, insight, legend, measure_kinds, measuring, project, view
 from .variables import MOST_SLIDERS
 
 PIXELS = 7.5
@@ -73,7 +73,21 @@ def draw_variables(layout: Any, context: Any) -> None:
     button(side, "edit_variable", "", "GREASEPENCIL")
     button(side, "bound_variable", "", "ARROW_LEFTRIGHT")
     button(side, "reset_values", "", "LOOP_BACK")
+    draw_ways(layout, context)
     draw_sliders(layout, context)
+
+
+def draw_ways(layout: Any, context: Any) -> None:
+    """Buttons for new variables of the handle that is active."""
+    kind, row = choosing.stage_table(context).get("deformer", ""), layout.row(align=True)
+    ways = [("SELECTION", "From Selection", "VERTEXSEL")] * (kind in edits.NETS)
+    ways += [("STATIONS", "By Stations", "MOD_LATTICE")] * (kind == "lattice")
+    ways += [("NAMED", "Of Skeleton", "BONE_DATA")] * bool(choosing.parameters(context))
+    row.operator_context = "INVOKE_DEFAULT"
+    for way, text, icon in ways:
+        told = button(row, "add_variable", text, icon)
+        if told is not None:
+            told.by = way
 
 
 def draw_sliders(layout: Any, context: Any) -> None:

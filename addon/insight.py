@@ -149,6 +149,16 @@ def show_attribute(is_shown: bool) -> None:
                 shading.color_type = _now.shading.pop(key, "MATERIAL")
 
 
+def _bare(scene: Any) -> None:
+    """Take the colours away."""
+    surface = project.surface(scene)
+    if surface is not None and surface.mode != "EDIT":
+        convert.colour(surface.data, None)
+    legend.hide()
+    show_attribute(False)
+    view.redraw()
+
+
 class MOLDLINE_OT_show_sensitivity(Operator):
     """Colour the surface by how it moves for a unit of the active variable's number"""
 
@@ -184,12 +194,7 @@ class MOLDLINE_OT_hide_sensitivity(Operator):
     def execute(self, context):
         """Take the colours away."""
         context.scene.moldline_view.is_coloured = False
-        surface = project.surface(context.scene)
-        if surface is not None and surface.mode != "EDIT":
-            convert.colour(surface.data, None)
-        legend.hide()
-        show_attribute(False)
-        view.redraw()
+        _bare(context.scene)
         return {"FINISHED"}
 
 
@@ -294,6 +299,8 @@ def _watch() -> float:
     if scene is None or not hasattr(scene, "moldline") or not project.is_open(scene):
         return TICK
     name = scene.name
+    if legend.shown() is not None and not scene.moldline_view.is_coloured:
+        _bare(scene)  # an undo has switched them off
     if _now.read.get(name) != _shape_key(scene) and name not in _now.under_way:
         _ask_readings(scene)
     if scene.moldline_view.is_coloured and not session.busy():
@@ -323,6 +330,12 @@ def _loaded(*_: Any) -> None:
     _forget()
 
 
+@bpy.app.handlers.persistent
+def _gone_back(*_: Any) -> None:
+    """After undo and redo a mesh may have other colours than those that were asked for."""
+    _now.painted.clear()
+
+
 def _forget() -> None:
     for known in (_now.seen, _now.read, _now.painted, _now.why, _now.health, _now.under_way):
         known.clear()
@@ -336,6 +349,7 @@ def _again() -> None:
         known.clear()
 
 
+HANDLERS = (("load_post", _loaded), ("undo_post", _gone_back), ("redo_post", _gone_back))
 CLASSES = (
     MOLDLINE_OT_show_sensitivity,
     MOLDLINE_OT_hide_sensitivity,
@@ -352,7 +366,8 @@ def register() -> None:
     view.on_look(_looked)
     following.on_shape(_shape_came)
     session.on_ready(_again)
-    bpy.app.handlers.load_post.append(_loaded)
+    for name, handler in HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
     if not bpy.app.background:
         bpy.app.timers.register(_watch, first_interval=1.0, persistent=True)
 
@@ -361,8 +376,9 @@ def unregister() -> None:
     """Take them away."""
     if bpy.app.timers.is_registered(_watch):
         bpy.app.timers.unregister(_watch)
-    if _loaded in bpy.app.handlers.load_post:
-        bpy.app.handlers.load_post.remove(_loaded)
+    for name, handler in HANDLERS:
+        if handler in getattr(bpy.app.handlers, name):
+            getattr(bpy.app.handlers, name).remove(handler)
     show_attribute(False)
     _forget()
     _now.shading.clear()

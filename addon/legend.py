@@ -141,8 +141,8 @@ def _texts(scale: Scale, left: float, bottom: float, size: float) -> None:
 
 
 def _text_colour() -> tuple[float, float, float, float]:
-    theme = bpy.context.preferences.themes[0].view_3d
-    return (*theme.space.text_hi, 1.0)
+    space = getattr(bpy.context.preferences.themes[0].view_3d, "space", None)
+    return (*getattr(space, "text_hi", (1.0, 1.0, 1.0)), 1.0)
 
 
 def register() -> None:

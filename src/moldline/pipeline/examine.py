@@ -248,7 +248,7 @@ def proof(pipeline: Pipeline, values: Values | None = None, seed: int = 0) -> Pr
         name: jnp.asarray(variable.typical * rng.uniform(-1, 1, variable.size))
         for name, variable in pipeline.variables.items()
     }
-    methods = {
+    methods: set[str] = {
         stage.deformer.method(part.geometry.points, stage.controls(full))
         for part in _parts(pipeline, full)
         for stage in part.own_stages

@@ -124,11 +124,22 @@ def preferences():
 
 
 @pytest.fixture
-def ball_case(tmp_path):
-    """A folder with case.toml: a ball, 258 points, in a lattice with two numbers; the file."""
-    write_tri(tmp_path / "ball.tri", *ball())
-    (tmp_path / "case.toml").write_text(CASE)
-    return tmp_path / "case.toml"
+def ball_case(tmp_path_factory):
+    """A folder with case.toml: a ball, 258 points, in a lattice with two numbers; the file.
+
+    It is the same folder for all tests, as it was at first: moldline then has the case loaded.
+    """
+    folder = tmp_path_factory.getbasetemp() / "ball"
+    folder.mkdir(exist_ok=True)
+    for file in folder.iterdir():
+        if file.name not in ("ball.tri", "case.toml"):
+            shutil.rmtree(file) if file.is_dir() else file.unlink()
+    write_tri(folder / "fresh.tri", *ball())
+    for name, text in (("ball.tri", (folder / "fresh.tri").read_text()), ("case.toml", CASE)):
+        if not (folder / name).exists() or (folder / name).read_text() != text:
+            (folder / name).write_text(text)
+    (folder / "fresh.tri").unlink()
+    return folder / "case.toml"
 
 
 def ball():

@@ -293,7 +293,8 @@ def test_the_page_tells_how_to_ask_without_a_client(path, keeper, folder, here):
     np.testing.assert_array_equal(found, want)
     known["link"].close()
     named = {*re.findall(r"^\| `(\w+)` \|", page, re.M)}
-    assert named == {"op", "hello", *protocol.ASKED_OF_SERVER, *protocol.ASKED_OF_CASE}
+    own = protocol.ASKED_OF_SERVER + protocol.ASKED_OF_CASE + protocol.ASKED_OF_WORKSHOP
+    assert named == {"op", "hello", *own}
 
 
 def test_another_protocol_is_told_which_one_is_spoken(path):

@@ -7,7 +7,8 @@ measured by a client in another process than the server's. `deform` is `moldline
 shell, the file it writes included; `open` a case's first request, `ping` one that does nothing;
 `sent` and `shared` are new values in and points out through the socket and through shared memory,
 `float` the latter in single precision; `per second` counts drags that end at the screen's side:
-values are pushed faster than they can be served, the latest wins.
+values are pushed faster than they can be served, the latest wins; `by hand` the same where a control
+point is pulled and the values are solved for.
 """
 
 import os
@@ -31,7 +32,7 @@ from moldline.server.remote import RemoteCase
 SIZES = (10_000, 48_000, 185_000, 1_000_000)
 COLUMNS = (
     "vertices", "cores", "load", "deform", "open", "ping", "in process", "sent", "shared",
-    "float", "pullback", "per second",
+    "float", "pullback", "per second", "by hand",
 )  # fmt: skip
 DRAG = 3.0
 """Seconds."""
@@ -96,6 +97,7 @@ def measured(size: int, folder: Path) -> table.Row:
         weights = np.ones_like(points)
         row["pullback"] = median(lambda: case.pullback(some(0.1), weights))
         row["per second"] = dragged(case)
+        row["by hand"] = pulled(case)
     with Client.connect(folder / "socket", shared=False) as client:
         case = client.open(folder / "case.toml")
         row["sent"] = median(lambda: case.points(some(0.1)))
@@ -111,6 +113,21 @@ def dragged(case: RemoteCase) -> float:
     while (passed := time.perf_counter() - start) < DRAG:
         live.push(some(0.1 * np.sin(passed)))
         shapes += live.poll(0.001) is not None
+    live.push(some(0.0))
+    live.finish()
+    return shapes / DRAG
+
+
+def pulled(case: RemoteCase) -> float:
+    """The same while a hand drags the control point in the middle."""
+    (handle,) = case.handles()
+    live, shapes, moved = case.live(dtype="<f4"), 0, handle.moved.copy()
+    start = time.perf_counter()
+    while (passed := time.perf_counter() - start) < DRAG:
+        moved[13, 2] = handle.moved[13, 2] + 0.1 * np.sin(passed)
+        live.pull(handle.stage, moved)
+        shapes += live.poll(0.001) is not None
+    live.pull(handle.stage, handle.moved)
     live.finish()
     return shapes / DRAG
 

@@ -53,7 +53,18 @@ class Where:
         return Client.start(self.socket, self.python or None, QUIT_AFTER)
 
 
-def with_remedy(error: ServerError) -> str:
+def problem_of(error: Exception) -> Problem:
+    """The problem that an error is."""
+    if isinstance(error, Problem):
+        return error
+    if isinstance(error, environment.Unmade):
+        return Problem(str(error), "environment")
+    if isinstance(error, ServerError):
+        return Problem(_with_remedy(error), error.code)
+    return Problem(f"{type(error).__name__}: {error}", "internal")
+
+
+def _with_remedy(error: ServerError) -> str:
     """What a client says, and which button helps."""
     said = str(error)
     button = environment.button() if environment.is_own() else ""
@@ -68,3 +79,18 @@ def with_remedy(error: ServerError) -> str:
             )
         return f"moldline is not running any more ({said}); press 'Restart'"
     return said
+
+
+def mismatch(running: str) -> str:
+    """That a running moldline is another than the add-on is made for, and what to do; or ""."""
+    own = environment.version()
+    if not own or running == own:
+        return ""
+    if not environment.is_own() and running.split(".dev")[0] == own.split(".dev")[0]:
+        return ""  # who develops moldline has it a few commits apart
+    remedy = (
+        "press 'Update environment'"
+        if environment.is_own()
+        else f"install moldline {own} in the environment that the preferences name"
+    )
+    return f"moldline {running} is running, this add-on is made for {own}: {remedy}, then 'Restart'"

@@ -15,11 +15,11 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import environment, window
+from . import environment, server, window
 from .client.client import Client
 from .client.protocol import ServerError
 from .client.starting import Place
-from .server import Problem, Where, with_remedy
+from .server import Problem, Where, problem_of
 
 TICK = 0.02
 """Seconds between looks at what threads have done."""
@@ -91,18 +91,7 @@ def sentence() -> str:
 
 def mismatch() -> str:
     """That the running moldline is another than the add-on is made for, and what to do; or ""."""
-    client, own = _now.client, environment.version()
-    if client is None or not own or client.moldline == own:
-        return ""
-    remedy = (
-        "press 'Update environment'"
-        if environment.is_own()
-        else f"install moldline {own} in the environment that the preferences name"
-    )
-    return (
-        f"moldline {client.moldline} is running, this add-on is made for {own}: {remedy}, then "
-        "'Restart'"
-    )
+    return server.mismatch(_now.client.moldline) if _now.client is not None else ""
 
 
 def busy() -> str:
@@ -202,14 +191,8 @@ def forget() -> None:
 
 def met(error: Exception) -> Problem:
     """The problem that a client's error is; where the connection was lost, all are told."""
-    if isinstance(error, Problem):
-        return error
-    if isinstance(error, environment.Unmade):
-        return Problem(str(error), "environment")
-    if not isinstance(error, ServerError):
-        return Problem(f"{type(error).__name__}: {error}", "internal")
-    problem = Problem(with_remedy(error), error.code)
-    if error.code in ("disconnected", "version"):
+    problem = problem_of(error)
+    if isinstance(error, ServerError) and error.code in ("disconnected", "version"):
         _now.why = str(problem)
         _done.put(lambda: [tell(problem) for tell in list(_now.lost)])
         wake()

@@ -21,6 +21,9 @@ NAMED = {
 BONES = {"rotation": 3, "translation": 3, "stretch": 1, "scale": 3}
 """Parameters of each bone of a skeleton, and how many numbers they have."""
 
+ANGLES = ("rotation", "angle")
+"""Of those, the angles."""
+
 DRAFTS = {"wing_skeleton": "wing-skeleton", "body_skeleton": "body-skeleton"}
 """Kinds of drafts that say what such a skeleton measures."""
 

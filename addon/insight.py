@@ -106,6 +106,8 @@ def _paint(scene: Any, case: Any, values: dict[str, Any], failed: Any) -> None:
     if table is None:
         failed(session.Problem("choose a variable; colours show how the shape answers to it"))
         return
+    if case.faces is None or case.faces.shape[1] != 3:
+        how = "size"  # sections and grids have no outward side
     number = min(scene.moldline.active_number, edits.size_of(table) - 1)
     title = f"{edits.labels_of(variable, table)[number]}: {_WHAT[how]}"
     unit = f"m/{table['unit']}" if table.get("unit") else "m"

@@ -121,6 +121,8 @@ class MOLDLINE_OT_add_variable(Operator):
             self.by = "NAMED"
         if self.by == "NAMED":
             self.parameter = self.parameter or (named[0] if named else "")
+            if self.parameter.rpartition(".")[2] in choosing.ANGLES:
+                self.unit, self.lower, self.upper = "deg", -15.0, 15.0
         elif not self.properties.is_property_set("upper"):
             reach = choosing.spacing(context.object) / 4
             self.lower, self.upper = -reach, reach

@@ -46,7 +46,7 @@ ICONS = {
 def draw_state(layout: Any, context: Any) -> None:
     """How moldline is, and what may be done about it; files."""
     now = session.state()
-    say(layout, context, session.sentence(), ICONS[now])
+    say(layout, context, session.sentence(), "ERROR" if session.mismatch() else ICONS[now])
     if session.busy():
         layout.label(text=f"{session.busy()} ...", icon="SORTTIME")
     row = layout.row(align=True)

@@ -221,6 +221,9 @@ def test_removing_takes_the_links_along(scene):
     assert "lift" not in told.get("variable", {}) and not told["stage"][0].get("link")
     assert "lift" not in scene.moldline.surface
     assert view.active_variable(scene) == ""
+    select(scene, [9])
+    bpy.ops.moldline.add_variable(name="again")
+    assert len(tables(scene)["stage"][0]["link"]) == 1
 
 
 def test_lists_follow_the_text(scene):

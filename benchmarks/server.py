@@ -7,8 +7,8 @@ measured by a client in another process than the server's. `deform` is `moldline
 shell, the file it writes included; `open` a case's first request, `ping` one that does nothing;
 `sent` and `shared` are new values in and points out through the socket and through shared memory,
 `float` the latter in single precision; `per second` counts drags that end at the screen's side:
-values are pushed faster than they can be served, the latest wins; `by hand` the same where a control
-point is pulled and the values are solved for.
+values are pushed faster than they can be served, the latest wins; `by hand` the same where a
+control point is pulled and the values are solved for.
 """
 
 import os

@@ -13,7 +13,7 @@ import numpy as np
 
 def main(folder: Path) -> None:
     """Write all scenes."""
-    for scene in (lattice, keys, twist, nodes, arm, decimate, cage, driven, curve):
+    for scene in (lattice, keys, twist, nodes, arm, decimate, cage, driven, curve, wrap):
         bpy.ops.wm.read_factory_settings(use_empty=True)
         scene()
         bpy.ops.wm.save_as_mainfile(filepath=str(folder / f"{scene.__name__}.blend"))
@@ -163,6 +163,24 @@ def curve():
     line.points.add(1)
     line.points[1].co = (1, 0, 0, 1)
     put("tube", data)
+
+
+def wrap():
+    """A column that shrinks down to a plane, in a collection that is not shown."""
+    plane = mesh("plane", [(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [(0, 1, 2, 3)])
+    plane.location.z = -0.5
+    body = column()
+    made = body.modifiers.new("Wrap", "SHRINKWRAP")
+    made.wrap_method, made.target, made.use_project_z = "PROJECT", plane, True
+    made.use_negative_direction = True
+    hidden = bpy.data.collections.new("hidden")
+    bpy.context.scene.collection.children.link(hidden)
+    for one in (body, plane):
+        bpy.context.scene.collection.objects.unlink(one)
+        hidden.objects.link(one)
+    bpy.context.view_layer.layer_collection.children["hidden"].exclude = True
+    keyed = put("keyed", bpy.data.lattices.new("keyed"))
+    keyed.shape_key_add(name="Basis")
 
 
 if __name__ == "__main__":

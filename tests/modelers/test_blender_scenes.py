@@ -242,6 +242,21 @@ def test_a_curve_is_evaluated_as_a_tube(scene):
     )
 
 
+def test_what_is_hidden_is_shrunk_onto_a_target_that_moves(scene):
+    path = 'objects["plane"].location'
+    blend = scene("wrap", parameters={"place": path, "high": f"{path}[2]"})
+    np.testing.assert_allclose(blend.values, [0, 0, -0.5, -0.5])
+    making = blend.bind()
+    assert np.ptp(np.asarray(making.geometry.points)[:, 2]) < 1e-6
+    found, errors = columns(making, np.array([0, 0, 0.3, -0.25]))
+    low = making(np.array([0, 0, 0.3, -0.25]))[:, 2]
+    np.testing.assert_allclose(low, -0.25, atol=1e-6)  # the last one that is set
+    for k, z in enumerate((0.0, 0.0, 0.0, 1.0)):
+        assert np.abs(found[k] - np.array([0, 0, z])).max() < 2 * errors[k] < 1e-5
+    with pytest.raises(ParameterError, match=r"lattice 'keyed' has shape keys.*turn their values"):
+        scene("wrap", controls={"a": {"object": "keyed"}})
+
+
 def test_a_changed_topology_is_told(scene):
     path = 'objects["wing"].modifiers["Fewer"].ratio'
     making = scene("decimate", parameters={"ratio": path}).bind()

@@ -75,7 +75,9 @@ class Process:
     """
 
     def __init__(self, interpreter: Path):
-        self._log = Path(tempfile.mkstemp(prefix="moldline_blender_", suffix=".log")[1])
+        handle, name = tempfile.mkstemp(prefix="moldline_blender_", suffix=".log")
+        os.close(handle)
+        self._log = Path(name)
         kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "PYTHONHOME")}
         self._words = command(interpreter)
         try:
@@ -254,9 +256,11 @@ class Pool:
             ) from None
 
     def _keep(self, process: Process) -> None:
-        if process.is_alive:
-            with self._lock:
-                self._idle.append(process)
+        if not process.is_alive:
+            process.end()
+            return
+        with self._lock:
+            self._idle.append(process)
 
 
 def _end_all(processes: Sequence[Process]) -> None:

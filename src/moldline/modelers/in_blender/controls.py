@@ -138,6 +138,12 @@ def moved(name: str, given: dict[str, Any], known: dict[str, Positions]) -> Abst
             f"controls {name!r}: {body.name!r} has points, which have a location only and are "
             "chosen by `points` or `group`",
         )
+    if body.type == "LATTICE" and body.data.shape_keys is not None:
+        raise Wrong(
+            "parameter",
+            f"controls {name!r}: the lattice {body.name!r} has shape keys, which say where its "
+            "points are; turn their values",
+        )
     points = known.setdefault(body.data.name_full, Positions(body))
     return MovedPoints(name, given, points)
 

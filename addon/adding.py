@@ -36,7 +36,16 @@ def add(operator: Any, context: Any, kind: str, bounded: bool, options: dict[str
     scene, obj = context.scene, context.object
     problems: list[str] = []
     stages.to_object_mode(context)
-    is_new = not project.has_case(scene) or not belongs(scene, obj)
+    is_new = not project.has_case(scene)
+    if not is_new and not belongs(scene, obj):
+        shown = project.surface(scene)
+        return amending.finished(
+            operator,
+            [
+                f"this scene's case is about {shown.name if shown else 'another object'!r}; select "
+                f"that, or close the case before you begin one of {obj.name!r}"
+            ],
+        )
     try:
         target = _geometry(obj) if is_new else None
     except session.Problem as problem:
@@ -60,8 +69,13 @@ def add(operator: Any, context: Any, kind: str, bounded: bool, options: dict[str
             _added(title, told["stage"], told["variables"], told["why"])
 
         if target is None:
-            _shift(found, told["stage"])
-            project.update_text(found, told["text"], then, problems.append)
+            before = handles.renumber(found, lambda n: n + (n >= told["stage"]))
+
+            def failed(problem: str) -> None:
+                handles.number(before)
+                problems.append(problem)
+
+            project.update_text(found, told["text"], then, failed)
         else:
             onto = bpy.data.objects.get(own)
             project.open_case(found, told["text"], folder, "", then, onto, problems.append)
@@ -76,11 +90,16 @@ def belongs(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bool:
 
 
 def selection(obj: bpy.types.Object) -> np.ndarray:
-    """Where the selected points of a mesh are, (k, 3), in its own coordinates."""
+    """Where the selected points of a mesh are, (k, 3), in the space of the case that it has."""
     if obj.mode == "EDIT":
         own = bmesh.from_edit_mesh(obj.data)
-        return np.array([v.co[:] for v in own.verts if v.select]).reshape(-1, 3)
-    return convert.points(obj.data)[choosing.selected(obj)]
+        found = np.array([v.co[:] for v in own.verts if v.select]).reshape(-1, 3)
+    else:
+        found = convert.points(obj.data)[choosing.selected(obj)]
+    place = np.array(obj.matrix_world, float)
+    if obj == bpy.context.scene.moldline.surface or np.array_equal(place, np.eye(4)):
+        return found
+    return found @ place[:3, :3].T + place[:3, 3]  # a new case is in the coordinates of the world
 
 
 def region(obj: bpy.types.Object) -> list[list[float]]:
@@ -144,13 +163,6 @@ def _written(client: Any, folder: str, target: Geometry) -> str:
         **own.options,
     )
     return target.name
-
-
-def _shift(scene: bpy.types.Scene, stage: int) -> None:
-    """Handles of stages behind a new one keep their objects."""
-    for obj in handles.all_of(scene):
-        if obj.moldline.stage >= stage:
-            obj.moldline.stage += 1
 
 
 def _added(title: str, stage: int, variables: list[str], why: str) -> None:

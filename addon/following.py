@@ -24,6 +24,10 @@ BUSY, IDLE = 0.004, 0.1
 AGAIN = 30.0
 """Seconds after which a server that was lost may be started by itself once more."""
 
+WRITTEN = 1.0
+"""Seconds after which a text is taken as written."""
+
+_texts: dict[str, tuple[str, float]] = {}
 _now: dict[str, pursuit.Pursuit] = {}
 _started: dict[str, float] = {}
 _loading: set[str] = set()
@@ -38,7 +42,9 @@ def on_shape(callback: Callable[[bpy.types.Scene, Any], None]) -> None:
 def is_busy(scene: bpy.types.Scene) -> bool:
     """Whether the shape is not yet what handles and values say."""
     found = _now.get(scene.name)
-    return project.has_case(scene) and (found is None or not found.is_resting)
+    if found is None or found.key is not project.opened(scene):
+        return project.has_case(scene)
+    return not found.is_resting
 
 
 def settle(scene: bpy.types.Scene | None = None, seconds: float = 60.0) -> None:
@@ -145,10 +151,21 @@ def _tick() -> float:
     pause = IDLE
     for scene in _scenes():
         if project.waits(scene):
-            project.reopen(scene)
+            if _is_written(scene):
+                project.reopen(scene)
         elif step(scene):
             pause = BUSY
     return pause
+
+
+def _is_written(scene: bpy.types.Scene) -> bool:
+    """Whether the case's text is what it was a moment ago: nobody is just writing it."""
+    now, text = time.monotonic(), project.text(scene)
+    before, since = _texts.get(scene.name, ("", now))
+    if text != before:
+        _texts[scene.name] = text, now
+        return False
+    return now - since > WRITTEN
 
 
 def _hurry() -> None:
@@ -204,7 +221,7 @@ def _loaded(*_: Any) -> None:
 
 
 def _forget_all() -> None:
-    for one in (_now, _started, _loading, pursuit.known):
+    for one in (_now, _texts, _started, _loading, pursuit.known):
         one.clear()
 
 

@@ -7,7 +7,7 @@ and in a file that was opened again.
 """
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -46,6 +46,20 @@ def of_stage(scene: bpy.types.Scene, stage: int) -> bpy.types.Object | None:
 def labels(obj: bpy.types.Object) -> list[str]:
     """A name for each of its points or bones."""
     return json.loads(obj.moldline.labels or "[]")
+
+
+def renumber(scene: bpy.types.Scene, new: Callable[[int], int]) -> dict[str, int]:
+    """Give handles other stages, since stages come or go; those that they had, by name."""
+    before = {one.name: one.moldline.stage for one in all_of(scene)}
+    number({name: new(stage) for name, stage in before.items()})
+    return before
+
+
+def number(stages: Mapping[str, int]) -> None:
+    """Give handles stages, by their names."""
+    for name, stage in stages.items():
+        if name in bpy.data.objects:
+            bpy.data.objects[name].moldline.stage = stage
 
 
 def rebuild(scene: bpy.types.Scene, surface: bpy.types.Object, found: Sequence[Any]) -> None:
@@ -245,7 +259,8 @@ def _pose(obj: bpy.types.Object, marks: np.ndarray) -> None:
     for bone, rest, size, mark in zip(obj.pose.bones, _rest(obj), sizes, marks, strict=True):
         turned, lengths = _frame(mark)
         pose = np.eye(4)
-        pose[:3, :3] = turned * np.array([1.0, *(lengths / size)])
+        grown = lengths / size
+        pose[:3, :3] = turned * np.array([grown[1], *grown])  # sections keep their proportions
         pose[:3, 3] = mark[0]
         bone.matrix_basis = Matrix(_inverse(rest) @ pose)
 

@@ -109,7 +109,7 @@ def is_open(scene: bpy.types.Scene) -> bool:
 
 
 def waits(scene: bpy.types.Scene) -> bool:
-    """Whether the case could be opened and nobody has tried to."""
+    """Whether the case is not open, could be, and nobody has tried to."""
     is_known = _key(scene) in _opening or _key(scene) in _refused
     return has_case(scene) and not is_known and session.state() == "ready" and not is_open(scene)
 
@@ -153,6 +153,8 @@ def open_case(
         here.text = bpy.data.texts.new(Path(path).name if path else "case.toml")
         here.text.write(text)
         here.folder, here.path, here.surface = folder, path, bpy.data.objects.get(own)
+        if here.surface is not None:
+            results.adopt(here.surface)
         _build(scene, *found)
 
     _open(scene, text, folder, opened, then, failed, keeps=False)
@@ -190,7 +192,7 @@ def update_text(
 def reopen(scene: bpy.types.Scene, then: Callable[[], None] | None = None) -> None:
     """Open the scene's case again from its text: after a file was loaded, or a server was lost."""
     if has_case(scene):
-        _open(scene, text(scene), scene.moldline.folder, _build_found, then, None)
+        _open(scene, text(scene), scene.moldline.folder, _build_found, then, None, undo="")
 
 
 def close_case(scene: bpy.types.Scene) -> None:
@@ -246,6 +248,7 @@ def _open(
     then: Callable[[], None] | None,
     failed: Callable[[str], None] | None,
     keeps: bool = True,
+    undo: str = "Change the case",
 ) -> None:
     name, key = scene.name, (folder, text)
     kept = values(scene) if keeps else {}
@@ -285,7 +288,7 @@ def _open(
         if failed is not None:
             failed(str(problem))
 
-    session.run(work, done, refused, what="Opening the case")
+    session.run(work, done, refused, "opening the case", undo=undo)
 
 
 def _build_found(scene: bpy.types.Scene, found: tuple) -> None:

@@ -68,7 +68,7 @@ class Pursuit:
     def again(self) -> None:
         """Values and handles as they are now decide, whatever was asked for before."""
         self.values, self.is_resting = None, False
-        self._asked.clear()
+        self._asked = dict.fromkeys(self._asked, b"")  # also one that is where it was put
 
     def refused(self) -> None:
         """What was asked for cannot be had: a handle goes back; values stay as they were given."""

@@ -5,6 +5,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from . import convert
 
@@ -37,6 +38,16 @@ def show(
     if shown.name not in scene.objects:
         scene.collection.objects.link(shown)
     return shown
+
+
+def adopt(obj: bpy.types.Object) -> None:
+    """Let an object show a result: what placed and changed its mesh is in the geometry already."""
+    if obj.data.users > 1:
+        obj.data = obj.data.copy()
+    if obj.data.shape_keys is not None:
+        obj.shape_key_clear()
+    obj.modifiers.clear()
+    obj.matrix_world = Matrix.Identity(4)
 
 
 def is_other(mesh: bpy.types.Mesh, points: np.ndarray, faces: np.ndarray | None) -> bool:

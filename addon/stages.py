@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from bpy.props import EnumProperty, IntProperty
 
-from . import amending, choosing, convert, edits, handles, project, results, session
+from . import amending, choosing, convert, edits, handles, project, results, session, view
 
 
 class MOLDLINE_OT_select_handle(bpy.types.Operator):
@@ -79,26 +79,32 @@ class MOLDLINE_OT_remove_stage(bpy.types.Operator):
 
     def execute(self, context):
         """Remove it."""
-        scene, number = context.scene, self.stage
-        if bpy.context.object is not None and bpy.context.object.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        wanted = removal(edits.tables(project.text(scene)), number)
-        names = {obj.name for obj in handles.all_of(scene) if obj.moldline.stage == number}
+        scene, number, problems = context.scene, self.stage, []
+        to_object_mode(context)
+        text, folder, name = project.text(scene), scene.moldline.folder, scene.name
+        case = edits.tables(text)
+        if not 0 <= number < len(case.get("stage", [])):
+            self.report({"ERROR"}, f"the case has no stage {number}")
+            return {"CANCELLED"}
+        wanted = removal(case, number)
 
-        def make(client: Any) -> edits.Edits:
-            return wanted
+        def amended(told: dict[str, Any]) -> None:
+            found = bpy.data.scenes[name]
+            before = handles.renumber(found, lambda n: -1 if n == number else n - (n > number))
 
-        before = {obj.name: obj.moldline.stage for obj in handles.all_of(scene)}
-        for obj in handles.all_of(scene):  # those behind it keep their objects
-            if obj.name in names:
-                obj.moldline.stage = -1
-            elif obj.moldline.stage > number:
-                obj.moldline.stage -= 1
-        found = amending.amend(self, context, "removing a stage", make)
-        if found == {"CANCELLED"}:
-            for name, stage in before.items():
-                bpy.data.objects[name].moldline.stage = stage
-        return found
+            def failed(problem: str) -> None:
+                handles.number(before)
+                problems.append(problem)
+
+            project.update_text(found, told["text"], lambda: view.sync(found), failed)
+
+        session.run(
+            lambda client: client.amend(text, folder, wanted),
+            amended,
+            lambda problem: problems.append(str(problem)),
+            what="removing a stage",
+        )
+        return amending.finished(self, problems)
 
 
 class MOLDLINE_OT_reset_handle(bpy.types.Operator):

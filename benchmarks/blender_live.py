@@ -5,9 +5,9 @@ usage: .venv-blender/bin/python benchmarks/blender_live.py [--markdown] [--sizes
 Runs in Blender's Python, in background, with the add-on of this repository; moldline runs in .venv,
 or in the environment whose interpreter MOLDLINE_PYTHON names. Each row is a wing of that many
 vertices under a lattice of `controls` control points that move freely. All of the way is measured:
-`hand` counts how often per second a control point that moved in edit mode was seen by the add-on, its
-values found by moldline, and the new points written into Blender's mesh; `slider` does the same for
-a value that was turned; `keyed` gives each frame of an animation its exact shape in double precision.
+`hand` counts how often per second a control point that moved in edit mode was seen by the add-on,
+its values found by moldline, and the new points written into Blender's mesh; `slider` does the same
+for a value that was turned; `keyed` gives each frame of an animation its shape in double precision.
 `late` is the time from a single motion to its points in the mesh [ms], `rest` from there to double
 precision and all handles in their places [ms]; medians.
 """

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 
 import bmesh
 import bpy
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from bl_ext.user_default.moldline import convert, following, handles, project, session
 from bl_ext.user_default.moldline.client.client import Client
+from conftest import CASE, ball, write_tri
 from mathutils import Vector
 
 LINK = '[[stage.link]]\nvariable = "lift"\nlink = "camber"\nalong = "x"\naxis = "z"\n'
@@ -24,24 +26,30 @@ def opened(path, text):
     return found
 
 
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    """One folder for all tests here, so that moldline loads each text once."""
+    found = tmp_path_factory.mktemp("following")
+    write_tri(found / "ball.tri", *ball())
+    return found / "case.toml"
+
+
 @pytest.fixture
-def scene(ball_case):
+def scene(place):
     """A scene with the ball's case, its handle free to move along z by two numbers."""
-    return opened(ball_case, ball_case.read_text())
+    return opened(place, CASE)
 
 
 @pytest.fixture
-def free(ball_case):
+def free(place):
     """The same with a number for each control point along z and along x, without bounds."""
-    text = (
-        ball_case.read_text().replace("bounds = [-1.0, 1.0]\n", "").replace("size = 2", "size = 12")
-    )
+    text = CASE.replace("bounds = [-1.0, 1.0]\n", "").replace("size = 2", "size = 12")
     links = "".join(
         f'[[stage.link]]\nvariable = "{name}"\nlink = "each"\naxis = "{axis}"\n\n'
         for name, axis in (("lift", "z"), ("push", "x"))
     )
     push = '[variable.push]\nsize = 12\nunit = "m"\n\n[[stage]]'
-    return opened(ball_case, text.replace(LINK, links).replace("[[stage]]", push, 1))
+    return opened(place, text.replace(LINK, links).replace("[[stage]]", push, 1))
 
 
 def shape(scene):
@@ -254,3 +262,71 @@ def test_a_file_that_is_opened_again_goes_on(free, tmp_path):
     assert project.values(found)["lift"][3] == pytest.approx(0.6, abs=1e-6)
     assert len(handles.all_of(found)) == 1
     np.testing.assert_array_equal(shape(found), wanted(found))
+
+
+def wait(scene, seconds=20.0):
+    """What Blender's timer does, until all rests."""
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        pause = following._tick()
+        if not following.is_busy(scene):
+            return
+        time.sleep(pause)
+    raise AssertionError(f"not at rest after {seconds} s: {scene.moldline.status}")
+
+
+def test_the_timer_follows_a_drag_and_brings_it_to_rest(free):
+    shown = []
+    following.on_shape(lambda scene, shape: shown.append(shape.points.dtype.str))
+    net = handles.of_stage(free, 0)
+    edit(net, 3, (0.0, 0.0, 0.1))
+    for _ in range(20):
+        edit_more(net, 3, (0.0, 0.0, 0.02))
+        bpy.context.view_layer.update()
+        following._tick()
+        time.sleep(0.01)
+    assert "<f4" in shown
+    wait(free)
+    assert shown[-1] == "<f8"
+    assert project.values(free)["lift"][3] == pytest.approx(0.5, abs=1e-6)
+    np.testing.assert_array_equal(shape(free), wanted(free))
+
+
+def edit_more(obj, index, motion):
+    """Move one vertex of a handle that is in edit mode."""
+    own = bmesh.from_edit_mesh(obj.data)
+    own.verts.ensure_lookup_table()
+    own.verts[index].co += Vector(motion)
+    bmesh.update_edit_mesh(obj.data)
+
+
+def test_undo_within_edit_mode_takes_the_shape_back_to_the_bit(free):
+    project.set_values(free, {"lift": np.linspace(0.0, 0.1, 12)})
+    following.settle()
+    before = shape(free)
+    edit(handles.of_stage(free, 0), 3, (0.0, 0.0, 0.0))
+    bpy.ops.ed.undo_push(message="in edit mode")
+    edit_more(handles.of_stage(free, 0), 3, (0.0, 0.0, 0.5))
+    bpy.ops.ed.undo_push(message="moved")
+    for rests in (False, True):
+        following.settle() if rests else following.step(free)
+        time.sleep(0.2)
+        following.step(free)
+        bpy.ops.ed.undo()
+        assert bpy.context.mode == "EDIT_MESH"
+        following.settle()
+        scene = bpy.context.scene
+        np.testing.assert_array_equal(project.values(scene)["lift"], np.linspace(0.0, 0.1, 12))
+        np.testing.assert_array_equal(shape(scene), before)
+        bpy.ops.ed.redo()
+    following.settle()
+    assert project.values(bpy.context.scene)["lift"][3] == pytest.approx(0.5 + 0.3 / 11, abs=1e-6)
+
+
+def test_a_text_that_is_edited_by_hand_is_opened_when_it_is_written(scene, monkeypatch):
+    monkeypatch.setattr(following, "WRITTEN", 0.0)
+    text = project.text(scene).replace("bounds = [-1.0, 1.0]", "bounds = [-3.0, 3.0]")
+    scene.moldline.text.clear()
+    scene.moldline.text.write(text)
+    wait(scene)
+    assert project.is_open(scene) and project.variables(scene)["lift"]["upper"] == [3.0, 3.0]

@@ -165,3 +165,11 @@ def test_files_beside_a_case_come_with_it_where_that_is_asked_for(folder, tmp_pa
     assert len(ml.load(other / "case.toml").pipeline.stages) == 2
     with pytest.raises(FileError, match="there is no folder"):
         relocated(text, folder, other / "none" / "case.toml")
+
+
+def test_a_lattice_over_a_region_turns_what_is_not_frozen_at_its_sides(folder):
+    region = [[-9.0, -0.01, 0.0], [9.0, 0.01, 9.0]]
+    found = begun(folder, shape=[3, 7, 6], region=region)
+    pipeline = of_text(found.text, folder).pipeline
+    frozen = pipeline.stages[0].deformer.frozen
+    assert frozen.any() and pipeline.variables["move_z"].size == np.count_nonzero(~frozen)

@@ -145,7 +145,7 @@ def lattice(
     if isinstance(geometry, Section):
         return _section_lattice(shape or (10, 2, 1))
     made = registry.deformer("lattice")
-    extent = made.over(geometry, (2, 2, 2), **options).edges
+    extent = made.over(geometry, (2, 2, 2), **{**options, "freeze": ()}).edges
     lengths = np.linalg.norm(extent, axis=1)
     spacing = lengths.max() / (ALONG - 1)
     counts = shape or tuple(int(n) for n in np.clip(np.rint(lengths / spacing) + 1, 2, ALONG))

@@ -301,6 +301,11 @@ def test_a_case_file_runs_with_the_command_line(tmp_path, interpreter, monkeypat
             objects["wing"].rise  0.5  (0 to 4)
         """)
     assert main(["blender", "list", str(tmp_path / "scene.blend"), "--object", "x"]) == 1
+    assert "no object 'x'; there are wing" in capsys.readouterr().err
+    assert main(["blender", "where"]) == 0
+    assert capsys.readouterr().out == f"{interpreter}\n"
+    assert main(["blender", "make", "--release", "4.4"]) == 1
+    assert "it is one of 4.5, 5.2" in capsys.readouterr().err
     case.write_text(CASE.replace("axes = ", "axis = "))
     with pytest.raises(CaseError, match=r"stage\.0\.controls\.tip\.axis: there is no such key"):
         load(case)

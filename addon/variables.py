@@ -118,17 +118,18 @@ class MOLDLINE_OT_edit_variable(Operator):
     def execute(self, context):
         """Change the case."""
         case, old = view.case_of(context.scene), view.active_variable(context.scene)
-        new, unit = self.name.strip() or old, unit_text(self.unit)
+        new, was = self.name.strip() or old, edits.variables(case)[old].get("unit", "")
+        unit = unit_text(self.unit) if self.properties.is_property_set("unit") else was
         try:
+            edits.check_name(new, (), "variable")
             table = edits.in_unit(edits.variables(case)[old], unit)
             wanted = _described(table, self) if not self.keep_bounds else table
             if self.typical > 0:
-                wanted["typical"] = self.typical
+                wanted["typical"] = edits.tidy(self.typical)
             changed = edits.changed_variable(case, old, new, wanted)
         except edits.Wrong as problem:
             self.report({"ERROR"}, str(problem))
             return {"CANCELLED"}
-        was = edits.variables(case)[old].get("unit", "")
         values = project.values(context.scene).get(old)
         factor = edits.UNITS[was] / edits.UNITS[unit]
 
@@ -141,7 +142,9 @@ class MOLDLINE_OT_edit_variable(Operator):
 
 
 def _described(table: dict[str, Any], asked: Any) -> dict[str, Any]:
-    """The table with the bounds that were asked for."""
+    """The table with the bounds that were asked for; a script that says none keeps them."""
+    if not any(asked.properties.is_property_set(key) for key in ("bounded", "lower", "upper")):
+        return dict(table)
     found = {key: value for key, value in table.items() if key != "bounds"}
     if asked.bounded:
         found["bounds"] = edits.check_bounds(asked.lower, asked.upper)

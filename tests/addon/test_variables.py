@@ -132,9 +132,12 @@ def test_the_normal_is_that_of_the_surface_next_to_them(scene):
 
 def test_frozen_control_points_get_no_number(tmp_path):
     scene = opened(tmp_path, 'freeze = ["y-"]')
-    select(scene, [0, 1, 2])
+    select(scene, [0, 1, 4])
     bpy.ops.moldline.add_variable(name="bump", moves="EACH")
-    assert tables(scene)["stage"][0]["link"][-1]["index"] == [[0, 1, 0]]
+    assert tables(scene)["stage"][0]["link"][-1]["index"] == [[0, 2, 0]]
+    bpy.ops.moldline.edit_variable(name="hump")
+    told = tables(scene)["variable"]
+    assert "bump" not in told and told["hump"]["unit"] == "m" and told["hump"]["bounds"] == [-1, 1]
 
 
 def test_stations_of_a_lattice_have_a_number_each(scene):

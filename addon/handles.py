@@ -208,7 +208,12 @@ def _fits(obj: bpy.types.Object, handle: Any) -> bool:
 
 def _is_whole(obj: bpy.types.Object) -> bool:
     kind = "ARMATURE" if obj.moldline.role == "bones" else "MESH"
-    return obj.type == kind and FROZEN in obj and own(obj) is not None
+    if obj.type != kind or FROZEN not in obj:
+        return False
+    if kind == "ARMATURE":
+        return len(obj.pose.bones) == len(obj[FROZEN])
+    has = bmesh.from_edit_mesh(obj.data).verts if obj.mode == "EDIT" else obj.data.vertices
+    return len(has) == len(obj[FROZEN])
 
 
 def _describe(obj: bpy.types.Object, handle: Any, surface: bpy.types.Object | None) -> None:
@@ -304,6 +309,9 @@ def _armature(scene: bpy.types.Scene, name: str, handle: Any) -> bpy.types.Objec
 def _edited(scene: bpy.types.Scene, obj: bpy.types.Object) -> Iterator[None]:
     """Edit mode of an object for a moment; what was active, and how, comes back."""
     layer = bpy.context.view_layer if bpy.context.scene == scene else scene.view_layers[0]
+    for one in layer.layer_collection.children:
+        if obj.name in one.collection.objects:
+            one.exclude = False
     before = layer.objects.active
     mode = before.mode if before is not None else "OBJECT"
     windows = bpy.context.window_manager.windows
@@ -329,7 +337,17 @@ def _apply(matrix: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    return np.linalg.pinv(matrix) if abs(np.linalg.det(matrix)) < 1e-30 else np.linalg.inv(matrix)
+    """Of an affine matrix; what a size of zero has lost stays lost."""
+    found = np.eye(4)
+    if np.array_equal(matrix, found):
+        return found
+    a, b, c = matrix[:3, :3]
+    columns = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    volume = float(a @ columns[:, 0])
+    is_flat = abs(volume) < 1e-30
+    found[:3, :3] = np.linalg.pinv(matrix[:3, :3]) if is_flat else columns / volume
+    found[:3, 3] = -found[:3, :3] @ matrix[:3, 3]
+    return found
 
 
 def register() -> None:

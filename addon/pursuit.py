@@ -63,6 +63,7 @@ class Pursuit:
         self._nets: tuple[int, Values] | None = None
         self._nets_of: Values | None = None
         self._nets_at = 0.0
+        self._places: dict[int, Handle] = {}
         self._before_edit: np.ndarray | None = None
 
     def again(self) -> None:
@@ -155,9 +156,8 @@ class Pursuit:
                 project.tell(scene, f"at its bounds: {at}" if at else "")
             elif not self._is_pull:
                 project.tell(scene, "")
-        told = self._answered()
-        if told is not None:
-            self._show_nets(scene, told)
+        if self._answered():
+            self._show_nets(scene)
         is_old = self._nets_of is None or not same(self._nets_of, self.values or {})
         is_time = time.monotonic() - self._nets_at > NETS
         if is_old and is_time and not (self._is_pull and self._coarse.is_busy):
@@ -184,18 +184,16 @@ class Pursuit:
             self._nets = self.case.send("handles", values=listed), self.values
             self._nets_at = time.monotonic()
 
-    def _answered(self) -> Any:
-        """Where the handles are, if that has come."""
-        if self._nets is None:
-            return None
-        told = self.case.taken(self._nets[0])
+    def _answered(self) -> bool:
+        """Whether it has just come where the handles are."""
+        told = self.case.taken(self._nets[0]) if self._nets is not None else None
         if told is not None:
-            self._nets_of, self._nets = self._nets[1], None
-        return told
+            self._places, self._nets_of, self._nets = _stages(told), self._nets[1], None
+        return told is not None
 
-    def _show_nets(self, scene: bpy.types.Scene, told: Any, lets_go: bool = False) -> None:
+    def _show_nets(self, scene: bpy.types.Scene, lets_go: bool = False) -> None:
         """Move handles to where values have them; those in a hand only when it lets go."""
-        stages = _stages(told)
+        stages = self._places
         for obj in handles.all_of(scene):
             handle = stages.get(obj.moldline.stage)
             if handle is None or len(handle.labels) != len(obj[handles.FROZEN]):
@@ -217,18 +215,17 @@ class Pursuit:
             return
         if not self._is_fine:
             self._is_fine = True
-            self._nets_of = None
             self._fine.push(self.values)
-        self._ask_nets()
         shape = self._fine.poll(0.02 if at_once else 0.0)
         if shape is not None:
             self._show(scene, shape)
         if self._fine.is_busy:
             return
-        told = self._answered()
-        is_new = self._nets_of is not None and same(self._nets_of, self.values)
-        if told is not None and is_new and not any(True for _ in self._moved(scene)):
-            self._show_nets(scene, told, lets_go=True)
+        self._answered()
+        if self._nets_of is None or not same(self._nets_of, self.values):
+            self._ask_nets()
+        elif not any(True for _ in self._moved(scene)):
+            self._show_nets(scene, lets_go=True)
             self.is_resting, self._is_pull = True, False
 
 

@@ -1,12 +1,10 @@
 """A scene holds its case: text, surface, values; and what shows it is made to fit."""
 
-import shutil
-
 import bpy
 import numpy as np
 import pytest
 from bl_ext.user_default.moldline import convert, following, handles, project, session
-from conftest import ball, write_tri
+from conftest import CASE, ball, write_tri
 
 
 def opened(path, text=None):
@@ -153,11 +151,12 @@ def test_undo_of_an_amendment_brings_the_old_case_back(ball_case):
     assert project.is_open(scene) and project.variables(scene)["lift"]["upper"] == [1.0, 1.0]
 
 
-def test_a_case_whose_files_are_gone_is_shown_and_told(ball_case, tmp_path):
-    scene = opened(ball_case)
+def test_a_case_whose_files_are_gone_is_shown_and_told(tmp_path):
+    write_tri(tmp_path / "ball.tri", *ball())
+    opened(tmp_path / "case.toml", CASE)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
     session.stop()
-    shutil.move(tmp_path / "ball.tri", tmp_path / "gone.tri")
+    (tmp_path / "ball.tri").unlink()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "file.blend"))
     scene = bpy.context.scene
     following.settle()

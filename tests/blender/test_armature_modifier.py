@@ -44,8 +44,6 @@ POSES = {
     "all": {"rotation": 0.5, "translation": 0.15, "stretch": 0.3, "scale": 0.3},
 }
 
-RIGID = ("turned", "moved")
-
 pytestmark = pytest.mark.blender
 
 
@@ -71,23 +69,23 @@ def assert_same(ours, theirs, points):
 
 
 @pytest.mark.parametrize("weights", ["envelope", "distance"])
-@pytest.mark.parametrize(("blend", "poses"), [("linear", POSES), ("dual quaternion", RIGID)])
-def test_bones_that_move_a_lattice_give_blenders_points(blender, points, weights, blend, poses):
+@pytest.mark.parametrize("blend", BLENDS)
+def test_bones_that_move_a_lattice_give_blenders_points(blender, points, weights, blend):
     skeleton = Skeleton(BONES, BOX, weights=weights, blend=blend)
     binding = skeleton.bind(points)
     hand = None if weights == "envelope" else skeleton.weights
-    for pose in poses:
-        controls = posed(**POSES[pose])
+    for pose in POSES.values():
+        controls = posed(**pose)
         lattice = lattice_scene(points, BOX, np.zeros(BOX.size))
         blender.open(**lattice, **bones_scene(BONES, controls, blend, hand))
         assert_same(np.asarray(binding(controls)), blender.deform()["deformed"], points)
 
 
-@pytest.mark.parametrize(("blend", "poses"), [("linear", POSES), ("dual quaternion", RIGID)])
-def test_bones_that_move_points_themselves_give_blenders_points(blender, points, blend, poses):
+@pytest.mark.parametrize("blend", BLENDS)
+def test_bones_that_move_points_themselves_give_blenders_points(blender, points, blend):
     binding = DirectSkeleton(BONES, blend=blend).bind(points)
-    for pose in poses:
-        controls = posed(**POSES[pose])
+    for pose in POSES.values():
+        controls = posed(**pose)
         blender.open(points=points, **bones_scene(BONES, controls, blend, binding.weights))
         assert_same(np.asarray(binding(controls)), blender.deform()["deformed"], points)
 
@@ -100,14 +98,3 @@ def test_envelopes_on_points_themselves_are_blenders(blender, points):
     assert np.any(shares.sum(axis=1) == 0)  # Blender leaves these where they are, too
     ours = points + DirectSkeleton(BONES).moves(points, shares, controls)
     assert_same(np.asarray(ours), blender.deform()["deformed"], points)
-
-
-def test_what_follows_one_bone_grows_alike_by_dual_quaternions(blender, points):
-    controls = posed(**POSES["all"])
-    skeleton = DirectSkeleton(BONES, blend="dual quaternion")
-    for bone in range(4):
-        shares = np.zeros((len(points), 4))
-        shares[:, bone] = 1
-        blender.open(points=points, **bones_scene(BONES, controls, "dual quaternion", shares))
-        ours = points + skeleton.moves(points, shares, controls)
-        assert_same(np.asarray(ours), blender.deform()["deformed"], points)

@@ -115,7 +115,8 @@ def displaced(
 ) -> Points:
     """Displacements of points that follow bones by their shares.
 
-    Dual quaternions blend what is rigid; growth comes before it, blended linearly at rest.
+    Dual quaternions blend what is rigid: each bone's growth, which comes before it, displaces the
+    point as a translation of that bone's own, as in Blender.
     """
     points, (rotations, shifts, growths) = jnp.asarray(points), motion
     if blend == "linear":
@@ -123,8 +124,7 @@ def displaced(
         matrices = turns + growths + turns @ growths
         rests = shifts - jnp.einsum("bij,bj->bi", matrices, bones.heads)
         return dual_quaternions.linear(points, weights, matrices, rests)
-    rests = -jnp.einsum("bij,bj->bi", growths, bones.heads)
-    grown = dual_quaternions.linear(points, weights, growths, rests)
     rests = shifts - turn(rotations, bones.heads)
-    rigid = dual_quaternions.dual_quaternion(points + grown, weights, rotations, rests)
-    return grown + rigid
+    offsets = points - bones.heads[:, None]
+    grown = jnp.einsum("bij,bnj->bni", growths, offsets)
+    return dual_quaternions.dual_quaternion(points, weights, rotations, rests, grown)

@@ -51,6 +51,17 @@ def test_each_further_stage_has_variables_and_files_of_its_own(folder):
     assert [len(stage.links) for stage in case.pipeline.stages] == [3, 3, 3]
     files = [table.model_extra.get("file") for table in case.tables.stage]
     assert files == [None, "ball_cage.obj", "ball_cage_2.obj"]
+    assert [stage.carried for stage in case.pipeline.stages] == [False, True, True]
+
+
+def test_control_points_added_later_come_along_with_what_moved_before(folder):
+    text = drafted("", folder, "lattice", geometry="ball.tri", options={"shape": [2, 2, 2]}).text
+    text = drafted(text, folder, "lattice", options={"shape": [3, 3, 3]}).text
+    pipeline = of_text(text, folder).pipeline
+    lift = {"move_z": np.full(8, 0.2)}
+    lower = {"move_z_2": np.full(27, -0.2)}
+    at_rest = np.asarray(pipeline.points())
+    np.testing.assert_allclose(pipeline.points({**lift, **lower}), at_rest, atol=1e-12)
 
 
 def test_a_hand_is_given_variables_without_bounds(folder):

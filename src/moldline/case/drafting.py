@@ -11,6 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .. import registry
+from ..deformers.net import AbstractControlNet
 from ..errors import CaseError, FileError, MoldlineError, ParameterError
 from ..mesh import Geometry
 from ..mesh.io import read, write
@@ -125,7 +127,9 @@ def _added(
         if isinstance(stage, schema.ConstructionTable) and name in stage.of
     ]
     place = takers[0] if takers else len(tables.stage)
-    own = {"on": name} if len(names) > 1 else {}
+    own: dict[str, Any] = {"on": name} if len(names) > 1 else {}
+    if _is_led(tables, name, place, draft):
+        own["carried"] = True
     head = {key: value for key, value in draft.stage.items() if key == "deformer"}
     table = {**head, **own, **draft.stage, "link": draft.links}
     table = json.loads(json.dumps(table))  # tuples are lists in a case
@@ -137,6 +141,16 @@ def _added(
     else:
         edits.append({"append": ["stage"], "value": table})
     return Drafted(editing.amended(text, edits), draft.why, place, list(draft.variables))
+
+
+def _is_led(tables: schema.CaseTable, name: str, place: int, draft: Draft) -> bool:
+    """Whether control points, which are put around the geometry at rest, must come along with it.
+
+    Stages before may have moved it by now, or will later.
+    """
+    is_net = issubclass(registry.deformer(draft.stage["deformer"]), AbstractControlNet)
+    before = (s for s in tables.stage[:place] if isinstance(s, schema.StageTable))
+    return is_net and any(s.on in ("", name) for s in before)
 
 
 def _geometry(text: str, folder: Path, tables: schema.CaseTable, name: str) -> Geometry:

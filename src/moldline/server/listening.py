@@ -33,14 +33,14 @@ def at_path(path: Path) -> Iterator[socket.socket]:
         raise FileError(f"{path}: no socket can be made here: {error.strerror}") from None
     finally:
         os.umask(mask)
-    own = path.stat().st_ino
+    own = _identity(path)
     with listening:
         listening.listen(BACKLOG)
         try:
             yield listening
         finally:
             with contextlib.suppress(FileNotFoundError):
-                if path.stat().st_ino == own:  # not what another server put in its place
+                if _identity(path) == own:  # not what another server put in its place
                     path.unlink()
 
 
@@ -81,10 +81,13 @@ def announced(path: Path | None, told: dict) -> Iterator[None]:
         yield
         return
     private(path, json.dumps(told) + "\n")
+    own = _identity(path)
     try:
         yield
     finally:
-        path.unlink(missing_ok=True)
+        with contextlib.suppress(FileNotFoundError):
+            if _identity(path) == own:
+                path.unlink()
 
 
 def private(path: Path, text: str) -> None:
@@ -97,6 +100,12 @@ def private(path: Path, text: str) -> None:
         beside.replace(path)
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}") from None
+
+
+def _identity(path: Path) -> tuple[int, int]:
+    """What tells a file from a later one in its place; a number alone may be given again."""
+    found = path.stat()
+    return found.st_ino, found.st_ctime_ns
 
 
 def _make_way(path: Path) -> None:

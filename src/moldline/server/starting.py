@@ -96,6 +96,7 @@ def start(place: Place, python: str | PathLike[str] | None, quit_after: float, w
                 stderr=log,
                 env=_environment(),
                 start_new_session=True,  # a key that interrupts the client is not for the server
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
             )
         except OSError as error:
             raise ServerError("disconnected", f"{program}: cannot be started: {error}") from None

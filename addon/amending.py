@@ -11,6 +11,9 @@ from . import edits, project, session, view, window
 Make = Callable[[Any], edits.Edits]
 """Edits, made in a thread beside Blender with the client at hand."""
 
+_under_way: set[str] = set()
+"""Scenes whose case is being changed."""
+
 
 def amend(
     operator: Any,
@@ -28,7 +31,11 @@ def amend(
         operator.report({"ERROR"}, "there is no case yet; add a parameterisation first")
         return {"CANCELLED"}
     name, text, folder = scene.name, scene.moldline.text.as_string(), scene.moldline.folder
+    if name in _under_way and session.busy():  # what comes second would undo the first
+        operator.report({"WARNING"}, "the case is just being changed; wait a moment")
+        return {"CANCELLED"}
     problems: list[str] = []
+    _under_way.add(name)
 
     def work(client: Any) -> str:
         try:
@@ -38,6 +45,7 @@ def amend(
         return client.amend(text, folder, wanted)["text"]
 
     def done() -> None:
+        _under_way.discard(name)
         own = bpy.data.scenes[name]
         view.sync(own)
         if then is not None:
@@ -47,9 +55,10 @@ def amend(
         _push_undo(what)
 
     def taken(new: str) -> None:
-        project.update_text(bpy.data.scenes[name], new, then=done, failed=problems.append)
+        project.update_text(bpy.data.scenes[name], new, then=done, failed=failed)
 
-    def failed(problem: Exception) -> None:
+    def failed(problem: Any) -> None:
+        _under_way.discard(name)
         problems.append(str(problem))
         if not bpy.app.background:  # the operator has ended by now
             window.tell(problem)

@@ -5,7 +5,7 @@ import tomllib
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.moldline import edits, project, session, view
+from bl_ext.user_default.moldline import amending, edits, project, session, view
 from conftest import ball, write_tri
 
 NET = """\
@@ -119,6 +119,7 @@ def test_one_number_each_belongs_to_one_side_where_the_other_is_its_mirror_image
     assert np.isclose(points[:, 1].max() - rest[:, 1].max(), rest[:, 1].min() - points[:, 1].min())
 
 
+@pytest.mark.slow
 def test_the_normal_is_that_of_the_surface_next_to_them(scene):
     select(scene, [1, 3, 5, 7, 9, 11])  # all on top
     bpy.ops.moldline.add_variable(name="swell", axis="NORMAL")
@@ -130,6 +131,7 @@ def test_the_normal_is_that_of_the_surface_next_to_them(scene):
         bpy.ops.moldline.add_variable(name="swell_2", axis="NORMAL")
 
 
+@pytest.mark.slow
 def test_frozen_control_points_get_no_number(tmp_path):
     scene = opened(tmp_path, 'freeze = ["y-"]')
     select(scene, [0, 1, 4])
@@ -150,6 +152,7 @@ def test_stations_of_a_lattice_have_a_number_each(scene):
     assert np.abs(shape(scene) - project.case(scene).points_at_rest).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_variable_that_is_there_may_move_more(scene):
     select(scene, [1, 5])
     with pytest.raises(RuntimeError, match="there is a variable 'lift' already"):
@@ -243,4 +246,12 @@ def test_without_moldline_the_operator_says_so_and_nothing_changes(scene, prefer
     preferences.python = "/nowhere/python"
     with pytest.raises(RuntimeError, match="/nowhere/python"):
         bpy.ops.moldline.remove_variable()
+    assert scene.moldline.text.as_string() == before
+
+
+def test_one_change_waits_for_the_other(scene, monkeypatch):
+    before = scene.moldline.text.as_string()
+    monkeypatch.setattr(amending, "_under_way", {scene.name})
+    monkeypatch.setattr(session, "busy", lambda: "opening the case")
+    assert bpy.ops.moldline.remove_variable() == {"CANCELLED"}
     assert scene.moldline.text.as_string() == before

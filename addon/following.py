@@ -60,7 +60,7 @@ def settle(scene: bpy.types.Scene | None = None, seconds: float = 60.0) -> None:
     if not project.is_open(scene):
         project.reopen(scene)
     deadline = time.monotonic() + seconds
-    for _ in range(2):
+    for _ in range(3):  # both connections may have been lost
         try:
             while _step(scene, rests=True) and time.monotonic() < deadline:
                 time.sleep(0.0005)

@@ -256,7 +256,12 @@ def _open(
     _refused.discard(key)
 
     def work(client: Any) -> tuple:
-        found = client.open(text=text, folder=folder)
+        try:
+            found = client.open(text=text, folder=folder)
+        except ServerError as error:
+            if error.code != "disconnected":
+                raise
+            found = client.open(text=text, folder=folder)  # it went away unseen: start it again
         sizes = {n: v["size"] for n, v in found.variables.items()}
         own = {n: v for n, v in kept.items() if sizes.get(n) == len(v)}
         try:

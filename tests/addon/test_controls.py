@@ -255,3 +255,27 @@ def test_another_object_does_not_take_the_place_of_a_case(thing):
     with pytest.raises(RuntimeError, match="case is about 'ball'"):
         bpy.ops.moldline.add_lattice(shape=(2, 2, 2))
     assert project.text(bpy.context.scene) == text
+
+
+def test_a_body_skeleton_is_posed_by_its_bones(thing):
+    assert bpy.ops.moldline.add_body_skeleton(stations=4) == {"FINISHED"}
+    obj, before = bpy.context.object, shape()
+    bone = obj.pose.bones[1]
+    bone.location = bone.bone.matrix_local.to_3x3().inverted() @ type(bone.location)((0, 0, 0.1))
+    assert (shape() - before)[:, 2].max() > 0.05
+    np.testing.assert_allclose(handles.read(obj)[1, 0, 2], 0.1, atol=1e-5)
+
+
+def test_a_lattice_around_a_component_moves_that_alone(tmp_path):
+    points, faces = ball()
+    tags = np.repeat([0, 1], len(faces))
+    both = np.concatenate([faces, faces + len(points)])
+    write_tri(tmp_path / "two.tri", np.concatenate([points, points + [5.0, 0.0, 0.0]]), both, tags)
+    files.import_file(tmp_path / "two.tri", "m")
+    bpy.context.object.active_material_index = 1
+    assert bpy.ops.moldline.add_lattice(shape=(2, 2, 2), around="COMPONENT") == {"FINISHED"}
+    before = shape()
+    bpy.context.object.location.z = 0.5
+    moved = shape() - before
+    assert not moved[: len(points)].any()
+    np.testing.assert_allclose(moved[len(points) :, 2], 0.5, atol=1e-6)

@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from pathlib import Path
 
 import bmesh
 import bpy
@@ -218,7 +219,10 @@ def test_a_server_that_dies_in_a_drag_loses_nothing(free):
 
 
 def test_moldline_that_was_stopped_is_started_again(free):
-    Client(session.client().address, shared=False).shutdown()
+    address = session.client().address
+    Client(address, shared=False).shutdown()
+    while Path(address.socket).exists():
+        time.sleep(0.05)
     handles.of_stage(free, 0).data.vertices[3].co.z += 0.5
     following.settle()
     assert project.values(free)["lift"][3] == pytest.approx(0.5, abs=1e-6)

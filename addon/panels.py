@@ -107,7 +107,8 @@ def draw_parameterise(layout: Any, context: Any) -> None:
             row.label(text=name, icon="DOT", translate=False)
         else:
             shown.stage = number
-        row.label(text=kind.replace("_", " "), translate=False)
+        if kind.replace("_", " ") != name:
+            row.label(text=kind.replace("_", " "), translate=False)
         gone = button(row, "remove_stage", "", "X")
         if gone is not None:
             gone.stage = number

@@ -63,7 +63,7 @@ class Hand:
         """What does not change with the values."""
         return {
             "stage": self.number,
-            "name": self.stage.name,
+            "name": getattr(self._table, "name", None) or "",
             "deformer": getattr(self._table, "deformer", ""),
             "on": self.stage.on,
             "kind": self.kind,

@@ -70,7 +70,7 @@ def rests() -> bool:
 
 def tip() -> Vector:
     """The middle of the outermost bone."""
-    thing = bpy.data.objects["wingskeleton"]
+    thing = bpy.data.objects["wing skeleton"]
     bone = thing.pose.bones[-1]
     return thing.matrix_world @ ((bone.head + bone.tail) / 2)
 
@@ -86,14 +86,14 @@ def imported(hand: Hand) -> Iterator[float]:
     yield from hand.search("Import Geometry")
     yield from chosen(hand, SURFACE)
     yield from hand.until(lambda: "transport_wing" in bpy.data.objects, 90)
-    seen_from(hand, 55, -60, (18, 8, 0), 58)
+    seen_from(hand, 55, -60, (33, 9, 0), 47)
     yield from hand.picture("imported")
 
 
 def posed(hand: Hand) -> Iterator[float]:
     """A wing skeleton; its tip is dragged up and turned, undone and done again."""
     yield from hand.search("Add Wing Skeleton")
-    yield from hand.until(lambda: "wingskeleton" in bpy.data.objects, 120)
+    yield from hand.until(lambda: "wing skeleton" in bpy.data.objects, 120)
     yield from hand.until(rests)
     yield from hand.picture("skeleton")
     yield from hand.centre()
@@ -157,5 +157,6 @@ def session(hand: Hand) -> Iterator[float]:
         yield from part(hand)
 
 
-prepared()
-perform(session, FOLDER)
+if __name__ == "__main__":
+    prepared()
+    perform(session, FOLDER)

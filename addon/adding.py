@@ -33,55 +33,82 @@ class Geometry(NamedTuple):
 
 def add(operator: Any, context: Any, kind: str, bounded: bool, options: dict[str, Any]) -> set[str]:
     """Add a stage of a kind: to the scene's case where that is selected, else as a new case."""
-    scene, obj = context.scene, context.object
     problems: list[str] = []
     stages.to_object_mode(context)
-    is_new = not project.has_case(scene)
-    if not is_new and not belongs(scene, obj):
-        shown = project.surface(scene)
-        return amending.finished(
-            operator,
-            [
-                f"this scene's case is about {shown.name if shown else 'another object'!r}; select "
-                f"that, or close the case before you begin one of {obj.name!r}"
-            ],
-        )
     try:
-        target = _geometry(obj) if is_new else None
+        if project.has_case(context.scene):
+            _to_case(context.scene, context.object, kind, bounded, options, problems)
+        else:
+            _as_case(context.scene, context.object, kind, bounded, options, problems)
     except session.Problem as problem:
-        return amending.finished(operator, [str(problem)])
-    text = "" if is_new else project.text(scene)
-    folder = case_files.new_folder() if is_new else scene.moldline.folder
-    title, own = scene.name, obj.name if obj is not None else ""
-    chosen = {"on": options.pop("on")} if options.get("on") else {}
+        problems.append(str(problem))
+    return amending.finished(operator, problems)
+
+
+def _to_case(
+    scene: bpy.types.Scene,
+    obj: bpy.types.Object | None,
+    kind: str,
+    bounded: bool,
+    options: dict[str, Any],
+    problems: list[str],
+) -> None:
+    """One more stage of the scene's case, on what the active handle is on, or on the result."""
+    if not belongs(scene, obj):
+        shown = project.surface(scene)
+        raise session.Problem(
+            f"this scene's case is about {shown.name if shown else 'another object'!r}; select "
+            f"that, or close the case before you begin one of {obj.name!r}"
+        )
+    text, folder, title = project.text(scene), scene.moldline.folder, scene.name
+    on = (obj.moldline.on if obj is not None else "") or project.description(scene).get(
+        "result", ""
+    )
 
     def work(client: Any) -> dict[str, Any]:
-        if target is None:
-            return client.draft(text, folder, kind, bounded=bounded, **chosen, **options)
+        return client.draft(text, folder, kind, bounded=bounded, on=on, **options)
+
+    def drafted(told: dict[str, Any]) -> None:
+        found = bpy.data.scenes[title]
+        before = handles.renumber(found, lambda n: n + (n >= told["stage"]))
+
+        def failed(problem: str) -> None:
+            handles.number(before)
+            problems.append(problem)
+
+        project.update_text(found, told["text"], lambda: _added(title, told), failed)
+
+    session.run(work, drafted, lambda p: problems.append(str(p)), what=f"adding a {kind}")
+
+
+def _as_case(
+    scene: bpy.types.Scene,
+    obj: bpy.types.Object | None,
+    kind: str,
+    bounded: bool,
+    options: dict[str, Any],
+    problems: list[str],
+) -> None:
+    """A new case of an object, in a folder of its own until it is saved."""
+    target, folder = _geometry(obj), case_files.new_folder()
+    title, own = scene.name, obj.name if obj is not None else ""
+
+    def work(client: Any) -> dict[str, Any]:
         where = {"geometry": _written(client, folder, target)}
         where |= {"units": target.units} if target.units else {}
         return client.draft("", folder, kind, bounded=bounded, **where, **options)
 
     def drafted(told: dict[str, Any]) -> None:
-        found = bpy.data.scenes[title]
-
-        def then() -> None:
-            _added(title, told["stage"], told["variables"], told["why"])
-
-        if target is None:
-            before = handles.renumber(found, lambda n: n + (n >= told["stage"]))
-
-            def failed(problem: str) -> None:
-                handles.number(before)
-                problems.append(problem)
-
-            project.update_text(found, told["text"], then, failed)
-        else:
-            onto = bpy.data.objects.get(own)
-            project.open_case(found, told["text"], folder, "", then, onto, problems.append)
+        project.open_case(
+            bpy.data.scenes[title],
+            told["text"],
+            folder,
+            then=lambda: _added(title, told),
+            onto=bpy.data.objects.get(own),
+            failed=problems.append,
+        )
 
     session.run(work, drafted, lambda p: problems.append(str(p)), what=f"adding a {kind}")
-    return amending.finished(operator, problems)
 
 
 def belongs(scene: bpy.types.Scene, obj: bpy.types.Object | None) -> bool:
@@ -165,9 +192,9 @@ def _written(client: Any, folder: str, target: Geometry) -> str:
     return target.name
 
 
-def _added(title: str, stage: int, variables: list[str], why: str) -> None:
+def _added(title: str, told: dict[str, Any]) -> None:
     """Show what was added, and take hold of it."""
-    scene = bpy.data.scenes[title]
+    scene, stage, variables = bpy.data.scenes[title], told["stage"], told["variables"]
     view.sync(scene)
     if variables:
         view.choose(scene, variables[0])
@@ -175,5 +202,5 @@ def _added(title: str, stage: int, variables: list[str], why: str) -> None:
     obj = handles.of_stage(scene, stage)
     if obj is not None and bpy.context.scene == scene:
         stages.take(bpy.context, obj)
-    project.tell(scene, why)
+    project.tell(scene, told["why"])
     view.redraw()

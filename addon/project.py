@@ -255,21 +255,6 @@ def _open(
     _opening.add(key)
     _refused.discard(key)
 
-    def work(client: Any) -> tuple:
-        try:
-            found = client.open(text=text, folder=folder)
-        except ServerError as error:
-            if error.code != "disconnected":
-                raise
-            found = client.open(text=text, folder=folder)  # it went away unseen: start it again
-        sizes = {n: v["size"] for n, v in found.variables.items()}
-        own = {n: v for n, v in kept.items() if sizes.get(n) == len(v)}
-        try:
-            shape = found.shape(own)
-        except Exception:  # values that the new text refuses give way to its own
-            own, shape = {}, found.shape()
-        return client, found, own, shape, found.handles(own)
-
     def done(found: tuple) -> None:
         _opening.discard(key)
         _cases.pop(key, None)
@@ -293,7 +278,30 @@ def _open(
         if failed is not None:
             failed(str(problem))
 
-    session.run(work, done, refused, "opening the case", undo=undo)
+    session.run(
+        lambda client: _loaded(client, text, folder, kept),
+        done,
+        refused,
+        "opening the case",
+        undo=undo,
+    )
+
+
+def _loaded(client: Any, text: str, folder: str, kept: Mapping[str, np.ndarray]) -> tuple:
+    """In a thread beside Blender: a case, values that it takes, its shape and handles for them."""
+    try:
+        found = client.open(text=text, folder=folder)
+    except ServerError as error:
+        if error.code != "disconnected":
+            raise
+        found = client.open(text=text, folder=folder)  # it went away unseen: start it again
+    sizes = {n: v["size"] for n, v in found.variables.items()}
+    own = {n: v for n, v in kept.items() if sizes.get(n) == len(v)}
+    try:
+        shape = found.shape(own)
+    except Exception:  # values that the new text refuses give way to its own
+        own, shape = {}, found.shape()
+    return client, found, own, shape, found.handles(own)
 
 
 def _build_found(scene: bpy.types.Scene, found: tuple) -> None:

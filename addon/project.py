@@ -307,7 +307,8 @@ def _loaded(client: Any, text: str, folder: str, kept: Mapping[str, np.ndarray])
 def _build_found(scene: bpy.types.Scene, found: tuple) -> None:
     """After a reopening: the text is the one that was opened, unless an undo came between."""
     if _found(scene) is found[0]:
-        _build(scene, *found)
+        case, own, shape, nets = found
+        _build(scene, case, {**own, **values(scene)}, shape, nets)  # turned meanwhile: they count
 
 
 def _build(scene: bpy.types.Scene, case: Any, own: Mapping, shape: Any, nets: list) -> None:

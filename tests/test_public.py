@@ -6,8 +6,8 @@ import sys
 import moldline as ml
 
 PUBLIC = {
-    "AbstractBinding", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Body",
-    "BodySkeleton", "Bone", "Bones", "Cad", "Cage", "Cloud", "Constraint", "Construction",
+    "AbstractBinding", "AbstractDeformer", "AbstractModeler", "AbstractNumpyDeformer", "Blender",
+    "Body", "BodySkeleton", "Bone", "Bones", "Cad", "Cage", "Cloud", "Constraint", "Construction",
     "ControlVolume", "DirectSkeleton", "Esp", "Geometry", "Grid", "Hinge", "Kulfan", "Lattice",
     "LinearBinding", "Link", "Measurements", "Naca4", "Naca5", "NacaModified", "Nacelle",
     "OpenVsp", "Pilots", "Pipeline", "Planform", "Program", "Section", "Skeleton", "Spot", "Stage",

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from .mesh.planform import Planform, planform
     from .modelers.airfoils import airfoil
     from .modelers.base import AbstractModeler
+    from .modelers.blender import Blender
     from .modelers.body import Body
     from .modelers.cad import Cad
     from .modelers.esp import Esp
@@ -64,6 +65,7 @@ _HOMES = {
     "AbstractDeformer": "deformers.base",
     "AbstractModeler": "modelers.base",
     "AbstractNumpyDeformer": "deformers.foreign",
+    "Blender": "modelers.blender",
     "Body": "modelers.body",
     "BodySkeleton": "deformers.body_skeleton",
     "Bone": "deformers.bones",

@@ -1,4 +1,4 @@
-"""A session in a Blender with a window, its mouse and keys simulated; the command line runs the case."""
+"""A session in a Blender with a window, mouse and keys simulated."""
 
 import os
 import re
@@ -67,7 +67,8 @@ def test_a_wing_is_shaped_in_the_window_and_the_case_runs_by_itself(blender, dis
     _run([blender, *install, extension], environment)
     window = [blender, "--enable-event-simulate", "--window-geometry", "0", "0", "1400", "900"]
     session = TOP / "tests/addon/window/session.py"
-    said = _run([*window, "--python", session, "--", sys.executable, SURFACE, tmp_path], environment)
+    window += ["--python", session, "--", sys.executable, SURFACE, tmp_path]
+    said = _run(window, environment)
     if PICTURES:
         for picture in tmp_path.glob("*.png"):
             shutil.copy(picture, PICTURES)
@@ -76,7 +77,7 @@ def test_a_wing_is_shaped_in_the_window_and_the_case_runs_by_itself(blender, dis
     _run([sys.executable, "-m", "moldline", *deform], environment)
     ours, shown = ml.read(tmp_path / "new.tri").points, np.load(tmp_path / "shown.npy")
     assert np.abs(ours - ml.read(SURFACE).points).max() > 1
-    np.testing.assert_allclose(shown, ours, rtol=1e-6, atol=1e-6)  # the window's in single precision
+    np.testing.assert_allclose(shown, ours, rtol=1e-6, atol=1e-6)  # shown in floats
 
 
 def _run(command: list, environment: dict) -> str:

@@ -159,7 +159,7 @@ def test_a_saved_case_finds_its_airfoil_from_elsewhere(folder, tmp_path):
         ('of = ["wing", "body"]', 'of = ["wing", "tail"]', "stage.3: nothing named 'tail'"),
         ('on = "wing"', 'on = "fin"', "stage.2.on: got 'fin', expected one of body, wing"),
         ('parameter = "origin"', 'parameter = "place"', "no parameter 'place'; there is: span"),
-        ('modeler = "wing"', 'modeler = "wings"', "no modelers named 'wings'; installed: blender, body"),
+        ('modeler = "wing"', 'modeler = "wings"', "no modelers named 'wings'; installed: blender"),
         ('airfoil = "flat.dat"', 'airfoil = "lost.dat"', "stage.1: .*lost.dat"),
         ('link = "each"\naxis = "z"', 'link = "named"\nparameter = "x"', "'named' is for a"),
         ("index = [2]", "index = [2]\nscale = -1.0", "stage.1.link.0.scale: got -1.0, expected 1"),

@@ -1,10 +1,9 @@
 """A designer at the window: import, wing skeleton, drag, undo, save; run by test_window.
 
-    blender --enable-event-simulate --python session.py -- PYTHON SURFACE FOLDER
+blender --enable-event-simulate --python session.py -- PYTHON SURFACE FOLDER
 """
 
 import sys
-import time
 from collections.abc import Iterator
 from math import radians
 from pathlib import Path
@@ -118,17 +117,17 @@ def posed(hand: Hand) -> Iterator[float]:
 
 
 def dragged(hand: Hand, key: str, dx: float, dy: float) -> Iterator[float]:
-    """A tool of Blender's with the mouse: begin, glide, confirm; how often the shape followed."""
-    shapes: list[float] = []
+    """A tool of Blender's with the mouse: begin, glide, confirm; the shape must follow."""
+    shapes: list[None] = []
     following = sys.modules[f"{MODULE}.following"]
-    following.on_shape(note := lambda *_: shapes.append(time.monotonic()))
+    following.on_shape(note := lambda *_: shapes.append(None))
     x, y = hand.place_of(tip())
     yield from hand.move(x, y)
     yield from hand.key(key)
     yield from hand.glide(x + dx, y + dy, 60, 0.01)
     yield from hand.key("RET")
     sys.modules[f"{MODULE}.pursuit"].listeners.remove(note)
-    print(f"{len(shapes)} shapes in {shapes[-1] - shapes[0]:.2f} s")
+    assert len(shapes) > 10, f"the shape followed {len(shapes)} times only in a drag of 60 steps"
     yield from hand.until(rests)
 
 

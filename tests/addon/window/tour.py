@@ -1,6 +1,6 @@
 """The tutorial's way through the add-on, with its pictures.
 
-    blender --enable-event-simulate --python tour.py -- PYTHON SURFACE FOLDER
+blender --enable-event-simulate --python tour.py -- PYTHON SURFACE FOLDER
 """
 
 import sys

@@ -1,6 +1,7 @@
 """Frames through a socket that waits. Standard library and NumPy only."""
 
 import socket
+import sys
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -10,6 +11,12 @@ from .protocol import Buffer, ServerError
 
 SMALL = 2**16
 """Pieces up to so many bytes are sent as one."""
+
+QUIET = getattr(socket, "MSG_NOSIGNAL", 0)
+"""A lost connection is an error, not SIGPIPE, of which a program that embeds Python would die."""
+
+SO_NOSIGPIPE = 0x1022
+"""The same as an option of a socket, where macOS has no flag; Python does not name it."""
 
 
 def receive(link: socket.socket, deadline: float | None = None) -> tuple[dict[str, Any], bytearray]:
@@ -25,17 +32,19 @@ def receive(link: socket.socket, deadline: float | None = None) -> tuple[dict[st
 def send(link: socket.socket, pieces: Sequence[Buffer], timeout: float | None = None) -> None:
     """A frame, all of it."""
     link.settimeout(timeout)
+    if sys.platform == "darwin" and not QUIET:
+        link.setsockopt(socket.SOL_SOCKET, SO_NOSIGPIPE, 1)
     waiting = b""
     for piece in pieces:
         if len(waiting) + len(piece) <= SMALL:
             waiting += bytes(piece)
             continue
         if waiting:
-            link.sendall(waiting)
+            link.sendall(waiting, QUIET)
         waiting = b""
-        link.sendall(piece)
+        link.sendall(piece, QUIET)
     if waiting:
-        link.sendall(waiting)
+        link.sendall(waiting, QUIET)
 
 
 def _exactly(link: socket.socket, count: int, deadline: float | None) -> bytearray:

@@ -55,7 +55,7 @@ def amend(
         _push_undo(what)
 
     def taken(new: str) -> None:
-        project.update_text(bpy.data.scenes[name], new, then=done, failed=failed)
+        project.update_text(bpy.data.scenes[name], new, then=done, failed=failed, undo="")
 
     def failed(problem: Any) -> None:
         _under_way.discard(name)

@@ -133,6 +133,7 @@ def state(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
         rows[:] = True
     elif not rows.any():
         return moved, rows
+    is_own = np.array_equal(place, np.eye(4)) and np.array_equal(place, before)
     for i in np.flatnonzero(rows):
         if obj.moldline.role == "bones":
             rest = _rest(obj)[i]
@@ -140,6 +141,8 @@ def state(obj: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
             moved[i] = _apply(place @ pose @ _inverse(old) @ _inverse(before), known[i])
         elif (local[i] != written[i]).any():
             moved[i] = _apply(place, local[i])
+            if is_own:  # a coordinate that was not touched stays to the bit
+                moved[i] = np.where(local[i] == written[i], known[i], moved[i])
     return moved, rows & ~np.array(obj[FROZEN], bool)
 
 

@@ -167,11 +167,12 @@ def update_text(
     failed: Callable[[str], None] | None = None,
     place: tuple[str, str] | None = None,
     keeps: bool = True,
+    undo: str = "Change the case",
 ) -> None:
     """Give the scene's case another text; values of variables that stay are kept, if `keeps`.
 
-    `place` is another folder and path of the case. Where the text cannot be opened, the old one
-    stays and the status says why.
+    `place` is another folder and path of the case; `undo` names the step, empty for none. Where
+    the text cannot be opened, the old one stays and the status says why.
     """
     folder, path = place or (scene.moldline.folder, scene.moldline.path)
 
@@ -186,7 +187,7 @@ def update_text(
             here.text.name = Path(path).name
         _build(scene, *found)
 
-    _open(scene, text, folder, opened, then, failed, keeps)
+    _open(scene, text, folder, opened, then, failed, keeps, undo)
 
 
 def reopen(scene: bpy.types.Scene, then: Callable[[], None] | None = None) -> None:

@@ -74,6 +74,7 @@ def test_a_vertex_that_is_moved_leaves_the_others_their_doubles(scene):
         assert list(np.flatnonzero(touched)) == [5]
         np.testing.assert_array_equal(np.delete(moved, 5, 0), np.delete(REST, 5, 0))
         np.testing.assert_allclose(moved[5], REST[5] + [0, 0, 1], atol=1e-7)
+        np.testing.assert_array_equal(moved[5][:2], REST[5][:2])
 
 
 def test_writing_in_edit_mode_moves_the_vertices(scene):

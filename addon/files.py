@@ -116,9 +116,9 @@ def geometry(things: Sequence[bpy.types.Object], ending: str = ".tri") -> Geomet
     if ending == ".dat":
         return _section(things)
     if len(things) == 1 and SHAPES in things[0].data and ending in PLOT3D:
-        shapes = json.loads(things[0].data[SHAPES])
-        if sum(i * j * k for i, j, k in shapes) == len(things[0].data.vertices):
-            return Geometry(_placed(things[0]), None, None, [], {}, {"shapes": shapes})
+        shapes, mesh = json.loads(things[0].data[SHAPES]), _evaluated(things[0])
+        if sum(i * j * k for i, j, k in shapes) == len(mesh.vertices):
+            return Geometry(_placed(things[0], mesh), None, None, [], {}, {"shapes": shapes})
     parts = [part for part in map(_part, things) if len(part.faces)]
     if not parts:
         raise session.Problem(
@@ -146,7 +146,7 @@ def source(thing: bpy.types.Object) -> tuple[str, str] | None:
         return None
     told = json.loads(thing[SOURCE])
     is_here = np.allclose(np.array(thing.matrix_world), np.eye(4), rtol=0, atol=0)
-    if not is_here or thing.modifiers or not Path(told["path"]).is_file():
+    if not is_here or _is_reshaped(thing) or not Path(told["path"]).is_file():
         return None
     is_same_file = Path(told["path"]).stat().st_mtime_ns == told["changed"]
     if not is_same_file or told["mark"] != _mark(thing.data):
@@ -164,16 +164,29 @@ class _Part(NamedTuple):
 
 
 def _part(thing: bpy.types.Object) -> _Part:
-    """One object, with its modifiers."""
-    if thing.mode == "EDIT":
-        thing.update_from_editmode()
-    own = thing.evaluated_get(bpy.context.evaluated_depsgraph_get()) if thing.modifiers else thing
-    mesh = own.data
+    """One object, with its modifiers and shape keys."""
+    mesh = _evaluated(thing)
     faces, tags = convert.triangles(mesh)
+    if np.linalg.det(np.array(thing.matrix_world, float)[:3, :3]) < 0:
+        faces = faces[:, ::-1]  # a mirrored surface is still seen from outside
     components = convert.components(mesh)
     if components == [mesh.name]:
         components = [thing.name]
     return _Part(thing.name, _placed(thing, mesh), faces, tags, components, convert.data(mesh))
+
+
+def _is_reshaped(thing: bpy.types.Object) -> bool:
+    """Whether Blender shows something else than the mesh itself."""
+    return bool(thing.modifiers) or thing.data.shape_keys is not None
+
+
+def _evaluated(thing: bpy.types.Object) -> bpy.types.Mesh:
+    """What Blender shows of an object."""
+    if thing.mode == "EDIT":
+        thing.update_from_editmode()
+    if not _is_reshaped(thing):
+        return thing.data
+    return thing.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
 
 def _placed(thing: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> np.ndarray:
@@ -187,13 +200,14 @@ def _placed(thing: bpy.types.Object, mesh: bpy.types.Mesh | None = None) -> np.n
 
 def _section(things: Sequence[bpy.types.Object]) -> Geometry:
     """One object without faces as a section: its points in the order of its edges."""
-    if len(things) != 1 or len(things[0].data.polygons):
+    mesh = _evaluated(things[0]) if len(things) == 1 else None
+    if mesh is None or len(mesh.polygons):
         raise session.Problem(
             "airfoil coordinates are of one object with edges and no faces; select it alone",
             "geometry",
         )
-    points = _placed(things[0])
-    order, is_closed = _chained(convert.lines(things[0].data), len(points))
+    points = _placed(things[0], mesh)
+    order, is_closed = _chained(convert.lines(mesh), len(points))
     return Geometry(points[order], None, None, [things[0].name], {}, {"is_closed": is_closed})
 
 

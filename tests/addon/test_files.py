@@ -164,3 +164,24 @@ def test_menus_and_dropped_files_know_the_operator():
     handler = bpy.types.MOLDLINE_FH_geometry
     assert handler.bl_import_operator == "moldline.import_geometry"
     assert ".tri" in handler.bl_file_extensions
+
+
+def test_what_shape_keys_show_is_written_also_of_what_was_read(tri, tmp_path):
+    found = imported(tri)
+    found.shape_key_add(name="Basis")
+    found.shape_key_add(name="up").value = 0.5
+    found.data.shape_keys.key_blocks["up"].data[0].co.z += 1.0
+    assert files.source(found) is None
+    bpy.ops.moldline.export_geometry(filepath=str(tmp_path / "up.tri"))
+    again = imported(tmp_path / "up.tri")
+    moved = convert.points(again.data) - ball()[0] / 3
+    assert moved[0, 2] == pytest.approx(0.5, abs=1e-7) and np.abs(moved[1:]).max() < 1e-7
+
+
+def test_a_mirrored_object_is_written_with_its_outside_outside(tri):
+    found = imported(tri)
+    found.scale.y = -1.0
+    bpy.context.view_layer.update()
+    given = files.geometry([found])
+    a, b, c = (given.points[given.faces[:, i]] for i in range(3))
+    assert np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c).min() > 0

@@ -15,7 +15,7 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from . import edits, following, project, session
+from . import edits, following, project, results, session
 from .amending import finished
 
 ENDING = ".toml"
@@ -54,7 +54,7 @@ def save(
     """
     place, name = Path(path).absolute(), scene.name
     text, folder = project.text(scene), scene.moldline.folder
-    wanted = changes(text, project.values(scene))
+    wanted = changes(text, project.turned(scene))
 
     def work(client: Any) -> str:
         own = client.amend(text, folder, wanted)["text"] if wanted else text
@@ -175,6 +175,8 @@ class MOLDLINE_OT_revert_case(bpy.types.Operator):
             self.report({"ERROR"}, f"{path}: cannot be read again: {error}")
             return {"CANCELLED"}
         place = (str(path.parent), str(path))
+        if scene.moldline.surface is not None:
+            scene.moldline.surface.pop(results.EDITED, None)
         project.update_text(scene, text, failed=problems.append, place=place, keeps=False)
         return finished(self, problems)
 

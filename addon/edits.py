@@ -57,6 +57,14 @@ def values_of(table: Mapping[str, Any]) -> list[float]:
     return _spread(table.get("value", 0.0), size_of(table))
 
 
+def is_same(table: Any, numbers: Sequence[float]) -> bool:
+    """Whether a variable's table, as a person may have written it, says these numbers."""
+    try:
+        return values_of(table) == list(numbers)
+    except (AttributeError, TypeError, ValueError):
+        return False
+
+
 def bounds_of(table: Mapping[str, Any]) -> list[tuple[float, float]]:
     """Lower and upper bound of each of its numbers."""
     given = table.get("bounds", FREE)

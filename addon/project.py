@@ -15,7 +15,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from . import handles, results, session
+from . import edits, handles, results, session
 from .client.protocol import ServerError
 
 COLLECTION = "Moldline"
@@ -87,9 +87,19 @@ def values(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
     found = {}
     for name, told in variables(scene).items():
         own = shown.get(name) if shown is not None else None
-        number = np.atleast_1d(np.array(told["value"] if own is None else own, float))
+        try:
+            number = np.atleast_1d(np.array(told["value"] if own is None else own, float))
+        except (TypeError, ValueError):  # a person may give a property any type
+            number = np.zeros(0)
         found[name] = number if number.shape == (told["size"],) else np.array(told["value"], float)
     return found
+
+
+def turned(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
+    """Those of the values that count beside the text: not where that says others than it did."""
+    said, known = edits.variables(edits.tables(text(scene))), variables(scene)
+    found = values(scene)
+    return {n: v for n, v in found.items() if edits.is_same(said.get(n), known[n]["value"])}
 
 
 def set_values(scene: bpy.types.Scene, given: Mapping[str, Any]) -> None:
@@ -252,7 +262,7 @@ def _open(
     undo: str = "Change the case",
 ) -> None:
     name, key = scene.name, (folder, text)
-    kept = values(scene) if keeps else {}
+    kept = turned(scene) if keeps else {}
     _opening.add(key)
     _refused.discard(key)
 
@@ -266,7 +276,8 @@ def _open(
         if scene is None:
             return
         opened(scene, found[1:])
-        tell(scene, "")
+        is_edited = scene.moldline.surface.get(results.EDITED, False)
+        tell(scene, results.BY_HAND if is_edited else "", is_alert=is_edited)
         if then is not None:
             then()
 
@@ -309,7 +320,7 @@ def _build_found(scene: bpy.types.Scene, found: tuple) -> None:
     """After a reopening: the text is the one that was opened, unless an undo came between."""
     if _found(scene) is found[0]:
         case, own, shape, nets = found
-        _build(scene, case, {**own, **values(scene)}, shape, nets)  # turned meanwhile: they count
+        _build(scene, case, {**own, **turned(scene)}, shape, nets)  # turned meanwhile: they count
 
 
 def _build(scene: bpy.types.Scene, case: Any, own: Mapping, shape: Any, nets: list) -> None:

@@ -12,15 +12,26 @@ from . import convert
 EDITED, JOINED = "moldline_edited", "moldline_joined"
 """Properties of the object: whether it was edited by hand, and the name of its triangles."""
 
+BY_HAND = (
+    "the surface was edited by hand: 'Use Edited Surface' makes it the geometry, "
+    "'Restore Surface' brings the result back"
+)
+"""What is said while it is; nothing else writes over it."""
+
 
 def show(
     scene: bpy.types.Scene, shown: bpy.types.Object | None, case: Any, shape: Any, title: str
 ) -> bpy.types.Object:
-    """The object of the result, made where there is none, with the shape's points."""
+    """The object of the result, made where there is none, with the shape's points.
+
+    One that was edited by hand stays as it is.
+    """
     joining = (shape.faces, shape.tags, shape.components)
     faces, tags, components = case.joining if shape.faces is None else joining
     if shown is not None and shown.type != "MESH":
         shown = None
+    if shown is not None and shown.get(EDITED, False):
+        return shown
     if shown is None:
         lines = _lines(case, len(shape.points)) if faces is None else None
         shown = convert.new_object(
@@ -33,7 +44,6 @@ def show(
         else:
             convert.set_faces(shown, shape.points, faces, tags, components)
     shown.pop(JOINED, None)
-    shown.pop(EDITED, None)
     convert.set_points(shown.data, shape.points)
     if shown.name not in scene.objects:
         scene.collection.objects.link(shown)
@@ -42,6 +52,7 @@ def show(
 
 def adopt(obj: bpy.types.Object) -> None:
     """Let an object show a result: what placed and changed its mesh is in the geometry already."""
+    obj.pop(EDITED, None)
     if obj.data.users > 1:
         obj.data = obj.data.copy()
     if obj.data.shape_keys is not None:

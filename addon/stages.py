@@ -192,6 +192,7 @@ class MOLDLINE_OT_restore_surface(bpy.types.Operator):
         shown = project.surface(context.scene)
         if shown is not None:
             shown.hide_set(False)
+            shown.pop(results.EDITED, None)
         project.reopen(context.scene)
         return {"FINISHED"}
 
@@ -239,7 +240,11 @@ class MOLDLINE_OT_use_surface(bpy.types.Operator):
         def written(new: str) -> None:
             shown = bpy.data.scenes[title].moldline.surface
             shown.pop(results.EDITED, None)
-            project.update_text(bpy.data.scenes[title], new, keeps=False, failed=problems.append)
+            project.update_text(bpy.data.scenes[title], new, keeps=False, failed=failed)
+
+        def failed(problem: str) -> None:
+            bpy.data.scenes[title].moldline.surface[results.EDITED] = True
+            problems.append(problem)
 
         session.run(work, written, lambda p: problems.append(str(p)), what="writing the surface")
         return amending.finished(self, problems)

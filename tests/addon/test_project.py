@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-from bl_ext.user_default.moldline import convert, following, handles, project, session
+from bl_ext.user_default.moldline import convert, following, handles, project, results, session
 from conftest import CASE, ball, write_tri
 
 
@@ -162,3 +162,42 @@ def test_a_case_whose_files_are_gone_is_shown_and_told(tmp_path):
     following.settle()
     assert not project.is_open(scene) and "ball.tri" in scene.moldline.status
     assert len(project.surface(scene).data.vertices) == 258 and project.variables(scene)
+
+
+def test_a_value_that_is_written_into_the_text_by_hand_counts(ball_case):
+    scene = opened(ball_case)
+    project.set_values(scene, {"lift": [0.5, 0.25]})
+    following.settle()
+    text = ball_case.read_text()
+    for line, wanted in (("", [0.5, 0.25]), ("value = [0.125, 0.0]\n", [0.125, 0.0])):
+        scene.moldline.text.clear()
+        scene.moldline.text.write("# by hand\n" + text.replace("bounds", f"{line}bounds", 1))
+        following.settle()
+        np.testing.assert_array_equal(project.values(scene)["lift"], wanted)
+    np.testing.assert_array_equal(
+        convert.points(project.surface(scene).data),
+        project.case(scene).points({"lift": [0.125, 0.0]}),
+    )
+
+
+def test_a_property_of_another_type_is_as_good_as_none(ball_case):
+    scene = opened(ball_case)
+    for given in ("text", {"a": 1.0}, [1.0, 2.0, 3.0]):
+        project.surface(scene)["lift"] = given
+        np.testing.assert_array_equal(project.values(scene)["lift"], [0.0, 0.0])
+
+
+def test_a_surface_edited_by_hand_outlives_the_opening_of_its_file(ball_case, tmp_path):
+    scene = opened(ball_case)
+    surface = project.surface(scene)
+    surface.data.vertices[0].co.z += 3.0
+    surface[results.EDITED] = True
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edited.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "edited.blend"))
+    scene = bpy.context.scene
+    following.settle()
+    assert project.surface(scene).data.vertices[0].co.z > 2.0
+    assert project.is_open(scene) and scene.moldline.status == results.BY_HAND
+    assert bpy.ops.moldline.restore_surface() == {"FINISHED"}
+    following.settle()
+    assert project.surface(scene).data.vertices[0].co.z < 2.0 and not scene.moldline.is_alert

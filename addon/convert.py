@@ -87,13 +87,22 @@ def points(mesh: bpy.types.Mesh) -> np.ndarray:
             held = own.attributes.get(name)
             if held is None or held.data_type != "INT32_2D" or not len(found):
                 continue
-            bits = np.empty(2 * len(found), np.int32)
-            held.data.foreach_get("value", bits)
-            double = bits.view(np.float64)
+            double = _doubles(own, name)
             with np.errstate(over="ignore", invalid="ignore"):
                 is_valid = double.astype(np.float32) == found[:, axis]
             found[is_valid, axis] = double[is_valid]
         return found
+
+
+def has_doubles(mesh: bpy.types.Mesh) -> bool:
+    """Whether each point is where `set_points` has put it in double precision."""
+    found = floats(mesh)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return all(
+            name in mesh.attributes
+            and np.array_equal(column, _doubles(mesh, name).astype(np.float32))
+            for name, column in zip(DOUBLES, found.T, strict=True)
+        )
 
 
 def floats(mesh: bpy.types.Mesh) -> np.ndarray:
@@ -224,6 +233,12 @@ def settled(mesh: bpy.types.Mesh) -> Iterator[bpy.types.Mesh]:
         yield moment
     finally:
         bpy.data.meshes.remove(moment)
+
+
+def _doubles(mesh: bpy.types.Mesh, name: str) -> np.ndarray:
+    bits = np.empty(2 * len(mesh.vertices), np.int32)
+    mesh.attributes[name].data.foreach_get("value", bits)
+    return bits.view(np.float64)
 
 
 def _fill(

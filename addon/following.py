@@ -178,11 +178,14 @@ def _hurry() -> None:
 
 
 @persistent
-def _updated(scene: bpy.types.Scene, *_: Any) -> None:
+def _updated(scene: bpy.types.Scene, changes: bpy.types.Depsgraph) -> None:
     """Something changed: send it; what comes back is shown by the timer."""
     found = _now.get(scene.name)
     if found is None or found.key is not project.opened(scene):
         return
+    shown = scene.moldline.surface
+    if any(one.id.original == shown and one.is_updated_geometry for one in changes.updates):
+        found.notice(scene)
     before = found.changed_at
     try:
         if found.can_show(scene):
@@ -203,6 +206,12 @@ def _framed(scene: bpy.types.Scene, *_: Any) -> None:
         settle(scene)
     else:
         _hurry()
+
+
+@persistent
+def _going_back(*_: Any) -> None:
+    """Before undo and redo: what the surface is then is not by hand."""
+    forget()
 
 
 @persistent
@@ -255,6 +264,8 @@ def _there() -> None:
 HANDLERS = {
     "depsgraph_update_post": _updated,
     "frame_change_post": _framed,
+    "undo_pre": _going_back,
+    "redo_pre": _going_back,
     "undo_post": _gone_back,
     "redo_post": _gone_back,
     "load_post": _loaded,

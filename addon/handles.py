@@ -38,6 +38,11 @@ def all_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return sorted(found, key=lambda one: (one.moldline.stage, one.name))
 
 
+def broken(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Those that have not the points or bones that they were made with."""
+    return [one for one in scene.objects if one.moldline.role and not _is_whole(one)]
+
+
 def of_stage(scene: bpy.types.Scene, stage: int) -> bpy.types.Object | None:
     """The handle of a stage, if it is there."""
     return next((one for one in all_of(scene) if one.moldline.stage == stage), None)

@@ -276,7 +276,8 @@ def _open(
         if scene is None:
             return
         opened(scene, found[1:])
-        is_edited = scene.moldline.surface.get(results.EDITED, False)
+        shown = scene.moldline.surface
+        is_edited = shown is not None and bool(shown.get(results.EDITED, False))
         tell(scene, results.BY_HAND if is_edited else "", is_alert=is_edited)
         if then is not None:
             then()

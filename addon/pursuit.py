@@ -25,8 +25,8 @@ CAMERA = ("VIEW3D_OT_", "VIEW2D_OT_", "SCREEN_OT_", "WM_OT_", "MOLDLINE_OT_", "U
 
 Values = dict[str, np.ndarray]
 
-known: dict[tuple[str, bytes], Values] = {}
-"""Values that belong to where a handle is."""
+known: dict[tuple[str, str, str, bytes], Values] = {}
+"""Values that belong to where a handle of a case is."""
 
 listeners: list[Callable[[bpy.types.Scene, Any], None]] = []
 """Called with the scene and each shape that is shown."""
@@ -65,6 +65,7 @@ class Pursuit:
         self._nets_at = 0.0
         self._places: dict[int, Handle] = {}
         self._before_edit: np.ndarray | None = None
+        self._broken: list[str] = []
 
     def again(self) -> None:
         """Values and handles as they are now decide, whatever was asked for before."""
@@ -85,6 +86,7 @@ class Pursuit:
             self.ask(scene)
             self._take(scene)
             self._rest(scene, at_once)
+            self._complain(scene)
 
     def can_show(self, scene: bpy.types.Scene) -> bool:
         """Whether there is a surface that may be moved."""
@@ -99,14 +101,15 @@ class Pursuit:
             is_same = np.array_equal(self._before_edit, _coordinates(shown.data))
             self._before_edit = None
             if not is_same:
-                shown[results.EDITED] = True
-                project.tell(
-                    scene,
-                    "the surface was edited by hand: 'Use Edited Surface' makes it the geometry, "
-                    "'Restore Surface' brings the result back",
-                    is_alert=True,
-                )
+                _edited(scene, shown)
         return not shown.get(results.EDITED, False)
+
+    def notice(self, scene: bpy.types.Scene) -> None:
+        """The surface's mesh is another than before: see whether that is by hand."""
+        shown = project.surface(scene)
+        is_still = self.is_resting and shown is not None and shown.mode == "OBJECT"
+        if is_still and self._before_edit is None and not convert.has_doubles(shown.data):
+            _edited(scene, shown)
 
     def ask(self, scene: bpy.types.Scene) -> None:
         """Send what has changed: a handle that was moved, else values."""
@@ -114,7 +117,7 @@ class Pursuit:
             if self._coarse.is_busy and self._pulled != obj.name:
                 break  # one after the other: the latest request takes the place of all others
             self._asked[obj.name], self._pulled = mark, obj.name
-            own = known.get((obj.name, mark))
+            own = known.get(_key(scene, obj, mark))
             if own is not None:  # where it has been before: to the bit the same numbers
                 project.set_values(scene, own)
                 self._changed(self.values, is_pull=False)
@@ -128,6 +131,19 @@ class Pursuit:
         if self.values is None or not same(values, self.values):
             self._changed(values, is_pull=False)
             self._coarse.push(values)
+
+    def _complain(self, scene: bpy.types.Scene) -> None:
+        """Say once of a handle that it has lost or gained points, and so moves nothing."""
+        broken = [obj.name for obj in handles.broken(scene)]
+        if broken and broken != self._broken and self.is_resting:
+            project.tell(
+                scene,
+                f"{broken[0]!r} has other points than its stage, so it moves nothing; 'Show "
+                "Handles' makes it again",
+                is_alert=True,
+            )
+        if self.is_resting:
+            self._broken = broken
 
     def _changed(self, values: Values | None, is_pull: bool) -> None:
         self.values, self._is_pull = values, is_pull
@@ -174,6 +190,8 @@ class Pursuit:
             shown[results.JOINED] = name
         if len(shown.data.vertices) == len(shape.points):
             convert.set_points(shown.data, shape.points)
+        else:
+            _edited(scene, shown)
         for tell in listeners:
             tell(scene, shape)
 
@@ -234,6 +252,12 @@ def mark_of(obj: bpy.types.Object) -> bytes:
     return handles.own(obj).tobytes() + handles.placed(obj).tobytes()
 
 
+def _edited(scene: bpy.types.Scene, shown: bpy.types.Object) -> None:
+    """Keep what was done to the surface by hand, and say so."""
+    shown[results.EDITED] = True
+    project.tell(scene, results.BY_HAND, is_alert=True)
+
+
 def _coordinates(mesh: bpy.types.Mesh) -> np.ndarray:
     """Of a mesh as it is outside edit mode, also while it is in it."""
     found = np.empty(3 * len(mesh.vertices), np.float32)
@@ -265,12 +289,17 @@ def _stages(told: Any) -> dict[int, Handle]:
     return found
 
 
+def _key(scene: bpy.types.Scene, obj: bpy.types.Object, mark: bytes) -> tuple:
+    """In another case the same place may belong to other values."""
+    return scene.moldline.folder, project.text(scene), obj.name, mark
+
+
 def _remember(scene: bpy.types.Scene, obj: bpy.types.Object) -> None:
     """The values that belong to where a handle is."""
     stages = edits.tables(project.text(scene)).get("stage", [])
     if 0 <= obj.moldline.stage < len(stages):
         names = {row["variable"] for row in stages[obj.moldline.stage].get("link", [])}
-        key = obj.name, mark_of(obj)
+        key = _key(scene, obj, mark_of(obj))
         known.pop(key, None)
         known[key] = {n: v for n, v in project.values(scene).items() if n in names}
         while len(known) > MOST_KNOWN:

@@ -334,3 +334,57 @@ def test_a_text_that_is_edited_by_hand_is_opened_when_it_is_written(scene, monke
     scene.moldline.text.write(text)
     wait(scene)
     assert project.is_open(scene) and project.variables(scene)["lift"]["upper"] == [3.0, 3.0]
+
+
+def test_a_handle_that_has_lost_a_point_says_that_it_moves_nothing(free):
+    net = handles.of_stage(free, 0)
+    bpy.context.view_layer.objects.active = net
+    bpy.ops.object.mode_set(mode="EDIT")
+    own = bmesh.from_edit_mesh(net.data)
+    own.verts.ensure_lookup_table()
+    own.verts.remove(own.verts[0])
+    bmesh.update_edit_mesh(net.data)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    following.settle()
+    assert "other points than its stage" in free.moldline.status
+    assert bpy.ops.moldline.show_handles() == {"FINISHED"}
+    handles.of_stage(free, 0).data.vertices[3].co.z += 0.5
+    following.settle()
+    assert project.values(free)["lift"][3] == pytest.approx(0.5) and free.moldline.status == ""
+
+
+@pytest.mark.parametrize("tool", ["modifier", "join"])
+def test_a_surface_that_a_tool_has_changed_counts_as_edited(free, tool):
+    surface = project.surface(free)
+    bpy.ops.mesh.primitive_cube_add()
+    surface.select_set(True)
+    bpy.context.view_layer.objects.active = surface
+    if tool == "join":
+        bpy.ops.object.join()
+    else:
+        surface.modifiers.new("displace", "DISPLACE").strength = 0.2
+        bpy.ops.object.modifier_apply(modifier="displace")
+    bpy.context.view_layer.update()
+    before = shape(free)
+    project.set_values(free, {"lift": [0.25] * 12})
+    following.settle()
+    np.testing.assert_array_equal(shape(free), before)
+    assert "edited by hand" in free.moldline.status
+    assert bpy.ops.moldline.restore_surface() == {"FINISHED"}
+    following.settle()
+    np.testing.assert_array_equal(shape(free), wanted(free))
+
+
+def test_what_a_place_meant_in_one_case_means_nothing_in_another(place):
+    turned = CASE.replace("bounds = [-1.0, 1.0]\n", "").replace('"z"\n', '"z"\nscale = -1.0\n')
+    for text, sign in ((CASE, 1.0), (turned, -1.0)):
+        scene = opened(place, text)
+        net = handles.of_stage(scene, 0)
+        for height in (0.5, 0.0, 0.5):
+            project.set_values(scene, {"lift": 0.0})
+            following.settle()
+            for vertex in net.data.vertices:
+                vertex.co.z += height
+            following.settle()
+        np.testing.assert_allclose(project.values(scene)["lift"], 0.5 * sign, atol=1e-7)
+        np.testing.assert_array_equal(shape(scene), wanted(scene))

@@ -19,6 +19,9 @@ UNITS = {
 
 FREE = (-math.inf, math.inf)
 
+LONGEST = 63
+"""Bytes of a property's name in Blender."""
+
 NETS = ("lattice", "control_volume", "cage")
 """Deformers whose control points are moved one by one."""
 
@@ -110,6 +113,17 @@ def check_name(name: str, taken: Iterable[str], what: str) -> str:
     if name in set(taken):
         raise Wrong(f"there is a {what} {name!r} already; choose another name")
     return name
+
+
+def unfit(names: Iterable[str]) -> str:
+    """What is wrong with a variable's name for a property of an object, or nothing."""
+    for name in names:
+        if name.startswith("moldline") or len(name.encode()) > LONGEST:
+            return (
+                f"variable {name!r}: in Blender a name has at most {LONGEST} bytes and does not "
+                "begin with 'moldline'; choose another name"
+            )
+    return ""
 
 
 def check_size(name: str, table: Mapping[str, Any], size: int) -> None:

@@ -308,6 +308,8 @@ def _loaded(client: Any, text: str, folder: str, kept: Mapping[str, np.ndarray])
         if error.code != "disconnected":
             raise
         found = client.open(text=text, folder=folder)  # it went away unseen: start it again
+    if unfit := edits.unfit(found.variables):
+        raise session.Problem(unfit, "parameter")
     sizes = {n: v["size"] for n, v in found.variables.items()}
     own = {n: v for n, v in kept.items() if sizes.get(n) == len(v)}
     try:

@@ -193,6 +193,7 @@ class MOLDLINE_OT_restore_surface(bpy.types.Operator):
         if shown is not None:
             shown.hide_set(False)
             shown.pop(results.EDITED, None)
+        _put_back(context.scene)
         project.reopen(context.scene)
         return {"FINISHED"}
 
@@ -240,6 +241,7 @@ class MOLDLINE_OT_use_surface(bpy.types.Operator):
         def written(new: str) -> None:
             shown = bpy.data.scenes[title].moldline.surface
             shown.pop(results.EDITED, None)
+            _put_back(bpy.data.scenes[title])
             project.update_text(bpy.data.scenes[title], new, keeps=False, failed=failed)
 
         def failed(problem: str) -> None:
@@ -307,6 +309,12 @@ def mirrored(rest: np.ndarray, moved: np.ndarray, axis: int, sign: float) -> np.
         if distance[partner] < 1e-4 * size:
             found[i] = rest[i] + (moved[partner] - rest[partner]) * flip
     return found
+
+
+def _put_back(scene: bpy.types.Scene) -> None:
+    """Handles where moldline had them: applying a surface's place has moved them against it."""
+    for obj in handles.all_of(scene):
+        handles.restore(obj)
 
 
 def _remade(operator: Any, scene: bpy.types.Scene) -> set[str] | None:

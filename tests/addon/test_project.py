@@ -201,3 +201,29 @@ def test_a_surface_edited_by_hand_outlives_the_opening_of_its_file(ball_case, tm
     assert bpy.ops.moldline.restore_surface() == {"FINISHED"}
     following.settle()
     assert project.surface(scene).data.vertices[0].co.z < 2.0 and not scene.moldline.is_alert
+
+
+@pytest.mark.parametrize("name", ["v" * 64, "moldline_edited"])
+def test_a_name_that_blender_cannot_hold_is_refused(ball_case, name):
+    scene = bpy.context.scene
+    text = ball_case.read_text().replace("variable.lift", f"variable.{name}")
+    text = text.replace('"lift"', f'"{name}"')
+    project.open_case(scene, text, str(ball_case.parent))
+    assert not project.has_case(scene) and "choose another name" in scene.moldline.status
+
+
+def test_a_place_that_was_applied_changes_no_values(ball_case):
+    scene = opened(ball_case)
+    surface = project.surface(scene)
+    surface.location.z, surface.scale.x = 0.5, 2.0
+    surface.select_set(True)
+    bpy.context.view_layer.objects.active = surface
+    bpy.ops.object.transform_apply()
+    following.settle()
+    assert bpy.ops.moldline.restore_surface() == {"FINISHED"}
+    following.settle()
+    assert not project.values(scene)["lift"].any()
+    np.testing.assert_array_equal(convert.points(surface.data), project.case(scene).points())
+    np.testing.assert_array_equal(
+        handles.read(handles.of_stage(scene, 0)), project.case(scene).handles()[0].moved
+    )

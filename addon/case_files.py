@@ -15,7 +15,7 @@ import numpy as np
 from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from . import edits, following, project, results, session
+from . import edits, following, project, results, session, stages
 from .amending import finished
 
 ENDING = ".toml"
@@ -33,13 +33,21 @@ def open_file(
     then: Callable[[], None] | None = None,
     failed: Callable[[str], None] | None = None,
 ) -> None:
-    """Open a case file in a scene."""
-    place = Path(path).absolute()
+    """Open a case file in a scene; its surface is taken hold of."""
+    place, name = Path(path).absolute(), scene.name
+
+    def opened() -> None:
+        found = project.surface(bpy.data.scenes[name])
+        if found is not None and bpy.context.scene.name == name:
+            stages.take(bpy.context, found)
+        if then is not None:
+            then()
+
     try:
         text = place.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise session.Problem(f"{place}: cannot be read as a case file: {error}", "file") from None
-    project.open_case(scene, text, str(place.parent), str(place), then, failed=failed)
+    project.open_case(scene, text, str(place.parent), str(place), opened, failed=failed)
 
 
 def save(

@@ -73,7 +73,7 @@ def _counts(default: tuple[int, int, int], about: str) -> Any:
 
 def _shape(self: Any) -> dict[str, Any]:
     counts = list(self.shape)
-    return {} if 0 in counts else {"shape": counts}
+    return {"shape": counts} if any(counts) else {}
 
 
 def _number(name: str, default: int, least: int, about: str) -> Any:
@@ -102,7 +102,7 @@ ADDING = (
         "lattice",
         "Put a box of control points around the object, a component or the selected points",
         {
-            "shape": _counts((0, 0, 0), "Along x, y and z; 0 0 0 is by the object's proportions"),
+            "shape": _counts((0, 0, 0), "Along x, y and z; 0 is by the object's proportions"),
             "around": _Fields.AROUND,
         },
         _shape,

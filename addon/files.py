@@ -336,7 +336,10 @@ class MOLDLINE_OT_export_geometry(bpy.types.Operator, ExportHelper):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Write."""
         chosen = context.selected_objects if self.only_selected else context.visible_objects
-        things = [one for one in chosen if one.type == "MESH"]
+        things = [one for one in chosen if one.type == "MESH" and not one.moldline.role]
+        shown = context.scene.moldline.surface
+        if not things and shown is not None:  # a handle of the case is selected
+            things = [shown]
         known = {ending for ending, _ in WRITE} | set(READ)
         path = Path(self.filepath)
         path = path if path.suffix.lower() in known else path.with_name(path.name + self.ending)

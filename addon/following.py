@@ -234,12 +234,12 @@ def _forget_all() -> None:
         one.clear()
 
 
-def _lost(problem: Exception) -> None:
+def _lost(_: Exception) -> None:
     """The server is gone: nothing is lost, and it is started once more by itself."""
     for scene in bpy.data.scenes:
         if project.has_case(scene):
             _now.pop(scene.name, None)
-            project.tell(scene, f"{problem}; the shape stays as it is", is_alert=True)
+            project.tell(scene, "the shape stays as it is until moldline runs again", is_alert=True)
     if not bpy.app.background and _is_time("") and _scenes():
         session.start()
 

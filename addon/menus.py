@@ -47,11 +47,16 @@ def _in_object(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.menu("MOLDLINE_MT_case")
 
 
+def _in_mesh(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    _in_object(menu, context)  # pilots and boxes go where points are selected
+    menu.layout.menu("MOLDLINE_MT_add", text="Moldline: Add", icon="MOD_LATTICE")
+
+
 PLACES = {
     "VIEW3D_MT_add": _in_add,
     "VIEW3D_MT_object": _in_object,
     "VIEW3D_MT_pose": _in_object,
-    "VIEW3D_MT_edit_mesh": _in_object,
+    "VIEW3D_MT_edit_mesh": _in_mesh,
 }
 
 

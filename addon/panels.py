@@ -49,9 +49,9 @@ def draw_state(layout: Any, context: Any) -> None:
     say(layout, context, session.sentence(), "ERROR" if session.mismatch() else ICONS[now])
     if session.busy():
         layout.label(text=f"{session.busy()} ...", icon="SORTTIME")
-    row = layout.row(align=True)
     if now == "no environment" or (now == "failed" and environment.is_own()):
-        button(row, "make_environment", environment.button(), "IMPORT")
+        button(layout, "make_environment", environment.button(), "IMPORT")
+    row = layout.row(align=True)
     if now == "stopped":
         button(row, "start_server", icon="PLAY")
     if now in ("ready", "failed"):

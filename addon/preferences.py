@@ -5,6 +5,7 @@ import bpy
 from bpy.props import BoolProperty, StringProperty
 
 from . import environment, session
+from .drawing import say
 
 
 def _changed(_preferences: bpy.types.AddonPreferences, _context: bpy.types.Context) -> None:
@@ -36,7 +37,7 @@ class MOLDLINE_AP_preferences(bpy.types.AddonPreferences):
         default=False,
     )
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def draw(self, context: bpy.types.Context) -> None:
         """What the preferences show."""
         layout = self.layout
         layout.use_property_split = True
@@ -45,7 +46,7 @@ class MOLDLINE_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "starts_at_once")
         for line in (session.sentence(), environment.progress()):
             if line:
-                layout.label(text=line)
+                say(layout, context, line)
         layout.operator("moldline.make_environment", text=environment.button())
 
 

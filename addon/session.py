@@ -224,6 +224,7 @@ def make_environment() -> None:
         environment.make(made)
     except environment.Unmade as problem:
         _now.why = str(problem)
+        wake()
         raise Problem(str(problem), "environment") from None
     wake()
     if bpy.app.background:

@@ -1,7 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What is said in the window."""
 
+import textwrap
+
 import bpy
+
+WIDE = 100
+"""Letters of a line in a menu; Blender cuts off what the window does not hold."""
 
 
 def show(text: str) -> None:
@@ -19,8 +24,9 @@ def tell(problem: object) -> None:
     """A sentence in the window."""
 
     def draw(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
-        for line in str(problem).splitlines():
-            menu.layout.label(text=line)
+        for paragraph in str(problem).splitlines():
+            for line in textwrap.wrap(paragraph, WIDE):
+                menu.layout.label(text=line, translate=False)
 
     windows = bpy.context.window_manager.windows
     if windows and not bpy.app.background:  # without a display, Blender crashes on a menu

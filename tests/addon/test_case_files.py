@@ -41,6 +41,7 @@ def test_a_case_written_by_hand_opens_and_is_saved_with_its_comments(ball_case):
     assert bpy.ops.moldline.open_case(filepath=str(ball_case)) == {"FINISHED"}
     scene = bpy.context.scene
     assert scene.moldline.path == str(ball_case) and len(handles.all_of(scene)) == 1
+    assert bpy.context.object == project.surface(scene)
     project.set_values(scene, {"lift": [0.25, -0.125]})
     points = shape()
     assert bpy.ops.moldline.save_case() == {"FINISHED"}
@@ -49,6 +50,15 @@ def test_a_case_written_by_hand_opens_and_is_saved_with_its_comments(ball_case):
     assert project.text(scene) == text and "saved" in scene.moldline.status
     np.testing.assert_array_equal(shape(), points)
     np.testing.assert_array_equal(run_by_command(ball_case), points)
+
+
+def test_with_a_handle_in_hand_the_surface_is_what_is_exported(ball_case, tmp_path):
+    bpy.ops.moldline.open_case(filepath=str(ball_case))
+    bpy.ops.moldline.select_handle(stage=0)
+    assert bpy.ops.moldline.export_geometry(filepath=str(tmp_path / "out.vtp")) == {"FINISHED"}
+    points = shape()
+    files.import_file(tmp_path / "out.vtp")
+    np.testing.assert_array_equal(convert.points(bpy.context.object.data), points)
 
 
 def test_a_case_begun_in_blender_is_saved_with_what_it_needs(tmp_path):

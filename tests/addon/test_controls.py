@@ -78,6 +78,12 @@ def test_a_lattice_around_an_imported_object_is_a_case_that_a_hand_moves(thing):
     assert moved[:, 2].max() > 0.05 and np.abs(moved[:, :2]).max() < 1e-5
 
 
+def test_of_a_lattice_one_count_may_be_given_alone(thing):
+    bpy.ops.moldline.add_lattice(shape=(5, 0, 0))
+    counts = case()["stage"][0]["shape"]
+    assert counts[0] == 5 and min(counts) > 1 and len(bpy.context.object.data.vertices) > 20
+
+
 def test_a_second_lattice_around_selected_points_is_another_stage_of_the_case(thing):
     bpy.ops.moldline.add_lattice(shape=(3, 3, 3))
     first = bpy.context.object

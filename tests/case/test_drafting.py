@@ -54,6 +54,14 @@ def test_each_further_stage_has_variables_and_files_of_its_own(folder):
     assert [stage.carried for stage in case.pipeline.stages] == [False, True, True]
 
 
+def test_a_count_of_none_is_by_proportion(folder):
+    shapes = []
+    for asked in ({}, {"shape": [0, 0, 0]}, {"shape": [5, 0, 2]}):
+        text = drafted("", folder, "lattice", geometry="ball.tri", options=asked).text
+        shapes.append(tomllib.loads(text)["stage"][0]["shape"])
+    assert shapes[0] == shapes[1] and shapes[2] == [5, shapes[0][1], 2]
+
+
 def test_control_points_added_later_come_along_with_what_moved_before(folder):
     text = drafted("", folder, "lattice", geometry="ball.tri", options={"shape": [2, 2, 2]}).text
     text = drafted(text, folder, "lattice", options={"shape": [3, 3, 3]}).text

@@ -141,14 +141,18 @@ def _beside(source: Path, target: Path) -> str:
 def lattice(
     geometry: Geometry, *, shape: tuple[int, int, int] | None = None, **options: Any
 ) -> Draft:
-    """A box around it all or a part, each control point moving along the box's three axes."""
+    """A box around it all or a part, each control point moving along the box's three axes.
+
+    A count of 0 in the shape is by the box's proportions.
+    """
     if isinstance(geometry, Section):
-        return _section_lattice(shape or (10, 2, 1))
+        return _section_lattice(_counts(shape, (10, 2, 1)))
     made = registry.deformer("lattice")
     extent = made.over(geometry, (2, 2, 2), **{**options, "freeze": ()}).edges
     lengths = np.linalg.norm(extent, axis=1)
     spacing = lengths.max() / (ALONG - 1)
-    counts = shape or tuple(int(n) for n in np.clip(np.rint(lengths / spacing) + 1, 2, ALONG))
+    dense = np.clip(np.rint(lengths / spacing) + 1, 2, ALONG)
+    counts = _counts(shape, tuple(int(n) for n in dense))
     mirror: dict[str, Any] = {}
     on_plane = bool(np.any(geometry.points[:, 1] == 0)) and not np.any(geometry.points[:, 1] < 0)
     if on_plane and not options:
@@ -157,7 +161,11 @@ def lattice(
     draft = Draft(
         {"deformer": "lattice", "shape": list(counts), **options},
         f"{counts[0]} x {counts[1]} x {counts[2]} control points: "
-        + ("as asked for" if shape else f"{ALONG} along the longest side, as dense along others")
+        + (
+            "as asked for"
+            if shape and any(shape)
+            else f"{ALONG} along the longest side, as dense along others"
+        )
         + "; each acts on about two spacings to each side of it",
     )
     free = int(np.sum(~np.asarray(made.over(geometry, counts, **options).frozen)))
@@ -174,7 +182,7 @@ def wing_lattice(
 ) -> Draft:
     """A swept, tapered box along a wing; stations rise, and sections move up and grow thicker."""
     geometry = _surface(geometry, "a wing's own box is fitted to a surface")
-    counts = shape or (7, 5, 2)
+    counts = _counts(shape, (7, 5, 2))
     made = registry.deformer("control_volume").build(geometry, wing=True, shape=counts, **options)
     draft = Draft(
         {"deformer": "control_volume", "wing": True, "shape": list(counts), **_plain(options)},
@@ -278,7 +286,12 @@ def _surface(geometry: Geometry, need: str) -> Surface:
     return geometry
 
 
-def _section_lattice(shape: tuple[int, int, int]) -> Draft:
+def _counts(shape: tuple[int, int, int] | None, usual: Sequence[int]) -> tuple[int, ...]:
+    """The counts that are asked for; where they are none or 0, the usual ones."""
+    return tuple(own or one for own, one in zip(shape or (0, 0, 0), usual, strict=True))
+
+
+def _section_lattice(shape: Sequence[int]) -> Draft:
     draft = Draft(
         {"deformer": "lattice", "shape": list(shape), "margin": [0.02, 0.1, 0.0]},
         f"{shape[0]} stations along the chord, at each a number for thickness and one for camber",

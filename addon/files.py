@@ -323,8 +323,8 @@ class MOLDLINE_OT_export_geometry(bpy.types.Operator, ExportHelper):
         default="-",
     )
     only_selected: BoolProperty(
-        name="Selected objects only",
-        description="Otherwise all visible mesh objects are written",
+        name="Selected Only",
+        description="Otherwise all visible mesh objects are written; with a handle selected, its surface",
         default=True,
     )
 

@@ -324,7 +324,7 @@ class MOLDLINE_OT_export_geometry(bpy.types.Operator, ExportHelper):
     )
     only_selected: BoolProperty(
         name="Selected Only",
-        description="Otherwise all visible mesh objects are written; with a handle selected, its surface",
+        description="Otherwise all visible mesh objects are written; of a handle, its surface",
         default=True,
     )
 

@@ -393,7 +393,7 @@ def unregister() -> None:
         bpy.app.handlers.load_pre.remove(_another_file)
     if _now.thread is not None:
         _asked.put(None)
-    window.show("")
+    window.clear_soon()
     forget()
     _now.lost.clear()
     _now.ready.clear()

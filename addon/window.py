@@ -20,6 +20,12 @@ def show(text: str) -> None:
                 area.tag_redraw()
 
 
+def clear_soon() -> None:
+    """Say nothing more: a moment later, since at Blender's end windows are half gone already."""
+    if not bpy.app.background:
+        bpy.app.timers.register(lambda: show(""), first_interval=0.0)
+
+
 def tell(problem: object) -> None:
     """A sentence in the window."""
 

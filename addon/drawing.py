@@ -35,8 +35,8 @@ def say(layout: Any, context: Any, text: str, icon: str = "NONE") -> None:
     letters = max(20, int(wide / (PIXELS * scale)) - 5)
     column = layout.column(align=True)
     for paragraph in text.splitlines():
-        for number, line in enumerate(textwrap.wrap(paragraph, letters)):
-            column.label(text=line, icon=icon if number == 0 else "BLANK1", translate=False)
+        for line in textwrap.wrap(paragraph, letters):
+            column.label(text=line, icon=icon, translate=False)
             icon = "BLANK1" if icon != "NONE" else "NONE"
 
 

@@ -211,3 +211,23 @@ def test_wrong_links_and_cotangents_are_told(case, ball):
     )
     with pytest.raises(ParameterError, match="two different variables are named 't'"):
         ml.Pipeline(ball, [ml.Stage(box, p) for p in pair])
+
+
+def test_a_mirrored_stage_neither_moves_points_across_its_plane_nor_brings_them_back(ball):
+    box = ml.Lattice.around(ball, (3, 3, 3), margin=0.1)
+    aside = ml.variable("aside", size=3)
+    lift = ml.variable("lift", size=27)
+    stages = [
+        ml.Stage(box, {aside: links.camber(box, "x", "y")}),
+        ml.Stage(box, {lift: links.mirrored(box, links.each(box, "z"), "y")}),
+    ]
+    case = ml.Pipeline(ball, stages)
+    on_plane = ball.points[:, 1] == 0
+    lifted = {"lift": np.linspace(-0.1, 0.1, 27)}
+    assert np.all(np.asarray(case(lifted).points)[on_plane, 1] == 0)
+    moved = {"aside": [0.1, 0.2, 0.1]}
+    alone = ml.Pipeline(ball, stages[:1])
+    np.testing.assert_array_equal(case(moved).points, alone(moved).points)
+    slope = case.pushforward({}, {"aside": [1.0, 1.0, 1.0]})
+    np.testing.assert_allclose(slope[:, 1], alone.pushforward({}, {"aside": [1.0, 1.0, 1.0]})[:, 1])
+    assert np.abs(np.asarray(slope)[on_plane, 1]).min() > 0.1

@@ -140,7 +140,7 @@ class Branch(eqx.Module):
                     moved = moving.follow(start if stage.carried else present, controls)
                 if stage.carried and number > 0:
                     moved = present + (moved - start)
-                states[name] = (start, stage.held(start, moved))
+                states[name] = (start, stage.held(start, present, moved))
         return states[self.name][1]
 
     def steps(self, full: Full, rest: Points) -> list[Step]:

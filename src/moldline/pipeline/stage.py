@@ -78,13 +78,16 @@ class Stage(eqx.Module):
         except GeometryError as error:
             raise GeometryError(f"stage {self.name!r} on {geometry!r}: {error}") from None
 
-    def held(self, rest: Points, moved: Points) -> Points:
-        """Points on the plane of symmetry put back on it, which only undoes rounding."""
+    def held(self, rest: Points, present: Points, moved: Points) -> Points:
+        """Points that rest on the plane of symmetry, not moved across it by this stage.
+
+        This only undoes rounding; where a stage before has taken them off it, there they stay.
+        """
         if self.across is None:
             return moved
         axis = "xyz".index(self.across)
-        on_plane = rest[:, axis] == 0.0
-        return jnp.asarray(moved).at[:, axis].set(jnp.where(on_plane, 0.0, moved[:, axis]))
+        across = jnp.where(rest[:, axis] == 0.0, present[:, axis], moved[:, axis])
+        return jnp.asarray(moved).at[:, axis].set(across)
 
 
 class Step(NamedTuple):

@@ -5,15 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from moldline.errors import ParameterError
-from moldline.modelers.blender_found import found_interpreter
-
 SCENES = Path(__file__).parent / "blender_scenes.py"
 
 
 @pytest.fixture(scope="session")
 def blender():
     """The Blender that tests run; skips, and says why, where there is none."""
+    # not above: jaxtyping instruments what is imported after the files of fixtures
+    from moldline.errors import ParameterError
+    from moldline.modelers.blender_found import found_interpreter
+
     try:
         found = found_interpreter()
     except ParameterError as problem:

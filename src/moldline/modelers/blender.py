@@ -41,6 +41,8 @@ class Controls(TypedDict):
     same numbers, those of a group by their weights.
     """
 
+    __pydantic_config__ = {"extra": "forbid"}  # type: ignore[misc]  # noqa: RUF012
+
     object: str
     points: NotRequired[list[int]]
     group: NotRequired[str]

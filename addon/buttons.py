@@ -73,14 +73,4 @@ CLASSES = (
     MOLDLINE_OT_stop_server,
 )
 
-
-def register() -> None:
-    """Let Blender know."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    """Take it back."""
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

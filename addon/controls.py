@@ -231,16 +231,16 @@ def _pilots(case: dict[str, Any]) -> list[str]:
 
 CLASSES = (*ADDING, MOLDLINE_OT_add_pilot_points)
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Let Blender know."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
     stages.register()
 
 
 def unregister() -> None:
     """Take it back."""
     stages.unregister()
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()

@@ -380,11 +380,12 @@ def _export_entry(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
 
 CLASSES = (MOLDLINE_OT_import_geometry, MOLDLINE_OT_export_geometry, MOLDLINE_FH_geometry)
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Let Blender know."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
     bpy.types.TOPBAR_MT_file_import.append(_import_entry)
     bpy.types.TOPBAR_MT_file_export.append(_export_entry)
 
@@ -393,5 +394,4 @@ def unregister() -> None:
     """Take it back."""
     bpy.types.TOPBAR_MT_file_import.remove(_import_entry)
     bpy.types.TOPBAR_MT_file_export.remove(_export_entry)
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()

@@ -359,12 +359,13 @@ CLASSES = (
     MOLDLINE_OT_select_faults,
 )
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Make them known to Blender."""
     measuring.register()
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
     view.on_look(_looked)
     following.on_shape(_shape_came)
     session.on_ready(_again)
@@ -384,6 +385,5 @@ def unregister() -> None:
     show_attribute(False)
     _forget()
     _now.shading.clear()
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()
     measuring.unregister()

@@ -185,14 +185,4 @@ class MOLDLINE_OT_add_variable(Operator):
 
 CLASSES = (MOLDLINE_OT_add_variable,)
 
-
-def register() -> None:
-    """Make them known to Blender."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
-
-
-def unregister() -> None:
-    """Take them away."""
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+register, unregister = bpy.utils.register_classes_factory(CLASSES)

@@ -366,15 +366,15 @@ CLASSES = (
     MOLDLINE_MT_add_measure,
 )
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Make them known to Blender."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
 
 
 def unregister() -> None:
     """Take them away."""
     forget()
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()

@@ -59,11 +59,12 @@ PLACES = {
     "VIEW3D_MT_edit_mesh": _in_mesh,
 }
 
+_make_known, _take_away = bpy.utils.register_classes_factory((MOLDLINE_MT_add, MOLDLINE_MT_case))
+
 
 def register() -> None:
     """Let Blender know."""
-    for one in (MOLDLINE_MT_add, MOLDLINE_MT_case):
-        bpy.utils.register_class(one)
+    _make_known()
     for name, draw in PLACES.items():
         getattr(bpy.types, name).append(draw)
 
@@ -72,5 +73,4 @@ def unregister() -> None:
     """Take it back."""
     for name, draw in PLACES.items():
         getattr(bpy.types, name).remove(draw)
-    for one in (MOLDLINE_MT_case, MOLDLINE_MT_add):
-        bpy.utils.unregister_class(one)
+    _take_away()

@@ -267,14 +267,15 @@ CLASSES = (
     MOLDLINE_OT_reset_values,
 )
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Make them known to Blender, and what they stand on."""
     from . import linking
 
     view.register()
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
     linking.register()
 
 
@@ -283,6 +284,5 @@ def unregister() -> None:
     from . import linking
 
     linking.unregister()
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()
     view.unregister()

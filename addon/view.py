@@ -150,11 +150,12 @@ def _after(*_: Any) -> None:
 
 CLASSES = (MOLDLINE_PG_row, MOLDLINE_PG_view)
 
+_make_known, _take_away = bpy.utils.register_classes_factory(CLASSES)
+
 
 def register() -> None:
     """Make them known to Blender."""
-    for one in CLASSES:
-        bpy.utils.register_class(one)
+    _make_known()
     bpy.types.Scene.moldline_view = PointerProperty(type=MOLDLINE_PG_view)
     for handlers in (
         bpy.app.handlers.load_post,
@@ -177,5 +178,4 @@ def unregister() -> None:
         bpy.app.timers.unregister(_sync_all)
     _listeners.clear()
     del bpy.types.Scene.moldline_view
-    for one in reversed(CLASSES):
-        bpy.utils.unregister_class(one)
+    _take_away()

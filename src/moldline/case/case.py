@@ -1,7 +1,6 @@
 """A case: what a case file describes, ready to run."""
 
 import os
-import secrets
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -126,8 +125,21 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
     axes of space: enough to set the case up when the rest is to be streamed.
     """
     place = Path(path)
+    return _loaded(schema.text_of(place), place, sampled)
+
+
+def of_text(text: str, folder: Path) -> Case:
+    """The case that a text describes, whose files are named from a folder."""
+    place = folder / editing.TOLD
+    try:
+        return _loaded(text, place)
+    except CaseError as error:
+        raise CaseError(str(error).replace(str(place), editing.TOLD)) from None
+
+
+def _loaded(text: str, place: Path, sampled: bool = False) -> Case:
+    """The case of a text that is, or could be, the file at a place."""
     file = str(place)
-    text = schema.text_of(place)
     tables = schema.parse(text, file)
     geometries = {
         name: _read(place, table, f"geometry.{name}", sampled)
@@ -155,21 +167,6 @@ def load(path: str | os.PathLike[str], sampled: bool = False) -> Case:
         }
     measurements = _measurements(file, tables, pipeline, sampled)
     return Case(place, tables, pipeline, riders, measurements, text)
-
-
-def of_text(text: str, folder: Path) -> Case:
-    """The case that a text describes, whose files are named from a folder."""
-    stand_in = folder / f".moldline-{secrets.token_hex(6)}.toml"
-    try:
-        stand_in.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise CaseError(f"{folder}: a case given as text is put here, but: {error}") from None
-    try:
-        return load(stand_in)
-    except CaseError as error:
-        raise CaseError(str(error).replace(str(stand_in), "the case's text")) from None
-    finally:
-        stand_in.unlink(missing_ok=True)
 
 
 def _measurements(
